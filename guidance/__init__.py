@@ -1,0 +1,42 @@
+"""Mathematics of powered descent: vehicle, motion, guidance laws. No terrain, no simulator.
+
+Frame: site-fixed, x east, y north, z up. SI units. Angles in radians.
+"""
+
+from typing import TYPE_CHECKING
+
+from guidance.exports import lazy_exports
+
+if TYPE_CHECKING:
+    from guidance.constants import MOON_GRAVITY, STANDARD_GRAVITY
+    from guidance.dynamics import propagate
+    from guidance.lander import PAPER_LANDER, Lander
+    from guidance.state import State
+    from guidance.zem_zev import saturate_thrust, time_to_go, zem_zev_acceleration
+
+__all__ = [
+    "MOON_GRAVITY",
+    "PAPER_LANDER",
+    "STANDARD_GRAVITY",
+    "Lander",
+    "State",
+    "propagate",
+    "saturate_thrust",
+    "time_to_go",
+    "zem_zev_acceleration",
+]
+
+__getattr__, __dir__ = lazy_exports(
+    __name__,
+    {
+        "MOON_GRAVITY": "guidance.constants",
+        "PAPER_LANDER": "guidance.lander",
+        "STANDARD_GRAVITY": "guidance.constants",
+        "Lander": "guidance.lander",
+        "State": "guidance.state",
+        "propagate": "guidance.dynamics",
+        "saturate_thrust": "guidance.zem_zev",
+        "time_to_go": "guidance.zem_zev",
+        "zem_zev_acceleration": "guidance.zem_zev",
+    },
+)

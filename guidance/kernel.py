@@ -1,0 +1,57 @@
+"""Compiled inner loops: one place decides how numba is used.
+
+Compiled code is kept per user, in a folder named after a hash of the sources of every package here: numba itself
+looks only at the file that defines a kernel, and would go on with stale code after a change in one that it calls.
+Where no folder can be written the kernel is compiled in memory. `LUNAR_HDA_CACHE` moves the folder.
+Never `fastmath`: it drops NaN checks and changes sums.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import TypeVar, cast
+
+import numba
+import platformdirs
+
+Function = TypeVar("Function", bound=Callable[..., object])
+
+
+def cache_folder() -> Path:
+    """Where generated data and compiled code are kept for this user (`LUNAR_HDA_CACHE` overrides)."""
+    override = os.environ.get("LUNAR_HDA_CACHE")
+    return Path(override) if override else Path(platformdirs.user_cache_dir("lunar-hda", appauthor=False))
+
+
+@cache
+def source_hash() -> str:
+    """Hash of every source file that may hold or call a kernel."""
+    root = Path(__file__).resolve().parent.parent
+    digest = hashlib.sha256(numba.__version__.encode())
+    for package in ("guidance", "hda"):
+        for path in sorted((root / package).rglob("*.py")):
+            digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def compile_kernel(function: Function, *, parallel: bool = False) -> Function:
+    """Compile a function on first call, without the GIL; cached on disk where that is possible."""
+    compiled = numba.njit(nogil=True, parallel=parallel)(function)
+    before = numba.config.CACHE_DIR
+    try:
+        numba.config.CACHE_DIR = str(cache_folder() / "kernels" / source_hash())
+        compiled.enable_caching()
+    except (RuntimeError, OSError):
+        pass  # nowhere to write: compile in memory
+    finally:
+        numba.config.CACHE_DIR = before
+    return cast("Function", compiled)
+
+
+def compile_parallel_kernel(function: Function) -> Function:
+    """Like `compile_kernel`, with `numba.prange` loops spread over the cores."""
+    return compile_kernel(function, parallel=True)

@@ -1,0 +1,44 @@
+"""Checks at the public doors: each failure is a ValueError that names the argument."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+
+def finite_vector(name: str, value: ArrayLike, size: int) -> NDArray[np.float64]:
+    """Return `value` as a float64 array of shape (size,); raise ValueError naming `name` otherwise."""
+    try:
+        vector = np.array(value, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{name} must be {size} numbers, got {value!r}") from error
+    if vector.shape != (size,):
+        raise ValueError(f"{name} must have shape ({size},), got {vector.shape}")
+    if not np.isfinite(vector).all():
+        raise ValueError(f"{name} must be finite, got {vector.tolist()}")
+    return vector
+
+
+def finite_number(
+    name: str,
+    value: float,
+    above: float = -math.inf,
+    at_least: float = -math.inf,
+    at_most: float = math.inf,
+) -> float:
+    """Return `value` as a float inside (above, inf) and [at_least, at_most]; raise ValueError naming `name`."""
+    try:
+        number = float(value)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{name} must be a number, got {value!r}") from error
+    if not math.isfinite(number):
+        raise ValueError(f"{name} must be finite, got {number}")
+    if number <= above:
+        raise ValueError(f"{name} must be greater than {above:g}, got {number:g}")
+    if number < at_least:
+        raise ValueError(f"{name} must be at least {at_least:g}, got {number:g}")
+    if number > at_most:
+        raise ValueError(f"{name} must be at most {at_most:g}, got {number:g}")
+    return number
