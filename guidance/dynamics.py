@@ -2,8 +2,9 @@
 
     r' = v,   v' = T/m + g,   m' = -|T| / (g_ref Isp)
 
-Under a constant thrust vector the equations have a closed form (Tsiolkovsky's equation, integrated once more), so
-a held thrust is propagated exactly, whatever the duration. A thrust that varies is integrated by DOP853.
+Under a constant thrust vector the equations have a closed form (Tsiolkovsky's equation, integrated once
+more), so a held thrust is propagated exactly, whatever the duration. A thrust that varies is integrated by
+DOP853.
 """
 
 from __future__ import annotations
@@ -53,7 +54,7 @@ def propagate_into(
     exhaust_velocity: float,
     out: NDArray[np.float64],
 ) -> None:
-    """Write the 7-vector reached from `start` (x y z vx vy vz m) under a constant thrust vector into `out`."""
+    """Write the 7-vector reached from `start` (x y z vx vy vz m) under a constant thrust into `out`."""
     mass = start[6]
     flow = math.sqrt(thrust[0] ** 2 + thrust[1] ** 2 + thrust[2] ** 2) / exhaust_velocity
     burnt = flow * duration / mass
@@ -122,12 +123,13 @@ def integrate(
         Shape (n, 7): position, velocity and mass at each of `times`.
 
     Raises:
-        ValueError: `times` does not increase.
+        ValueError: `times` is not finite or does not increase.
+        RuntimeError: the integrator cannot go on, as where all mass is burnt.
     """
     from scipy.integrate import solve_ivp
 
-    if times.ndim != 1 or times.size < 2 or not (np.diff(times) > 0.0).all():
-        raise ValueError("times must be strictly increasing, at least two")
+    if times.ndim != 1 or times.size < 2 or not np.isfinite(times).all() or not (np.diff(times) > 0.0).all():
+        raise ValueError("times must be finite and strictly increasing, at least two")
     pull = finite_vector("gravity", gravity, 3)
 
     def rate(time: float, y: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -138,8 +140,8 @@ def integrate(
     path = np.empty((times.size, 7))
     path[0] = state.as_array()
     for k in range(times.size - 1):
-        leg = solve_ivp(
-            rate, (times[k], times[k + 1]), path[k], method="DOP853", rtol=1e-11, atol=1e-10
-        )
+        leg = solve_ivp(rate, (times[k], times[k + 1]), path[k], method="DOP853", rtol=1e-11, atol=1e-10)
+        if not leg.success:
+            raise RuntimeError(f"integration stopped after {leg.t[-1]:g} s: {leg.message}")
         path[k + 1] = leg.y[:, -1]
     return path

@@ -1,9 +1,9 @@
 """Compiled inner loops: one place decides how numba is used.
 
-Compiled code is kept per user, in a folder named after a hash of the sources of every package here: numba itself
-looks only at the file that defines a kernel, and would go on with stale code after a change in one that it calls.
-Where no folder can be written the kernel is compiled in memory. `LUNAR_HDA_CACHE` moves the folder.
-Never `fastmath`: it drops NaN checks and changes sums.
+Compiled code is kept per user, in a folder named after a hash of the sources of every package here: numba
+itself looks only at the file that defines a kernel, and would go on with stale code after a change in another
+that it calls. Where no folder can be written the kernel is compiled in memory. `LUNAR_HDA_CACHE` moves the
+folder. Never `fastmath`: it drops NaN checks and changes sums.
 """
 
 from __future__ import annotations
@@ -13,12 +13,14 @@ import os
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
-from typing import TypeVar, cast
+from typing import Any, TypeVar, cast
 
 import numba
 import platformdirs
+from numba.core import config
 
 Function = TypeVar("Function", bound=Callable[..., object])
+_numba_config = cast("Any", config)  # numba names its settings at run time
 
 
 def cache_folder() -> Path:
@@ -41,14 +43,14 @@ def source_hash() -> str:
 def compile_kernel(function: Function, *, parallel: bool = False) -> Function:
     """Compile a function on first call, without the GIL; cached on disk where that is possible."""
     compiled = numba.njit(nogil=True, parallel=parallel)(function)
-    before = numba.config.CACHE_DIR
+    before = _numba_config.CACHE_DIR
     try:
-        numba.config.CACHE_DIR = str(cache_folder() / "kernels" / source_hash())
+        _numba_config.CACHE_DIR = str(cache_folder() / "kernels" / source_hash())
         compiled.enable_caching()
     except (RuntimeError, OSError):
         pass  # nowhere to write: compile in memory
     finally:
-        numba.config.CACHE_DIR = before
+        _numba_config.CACHE_DIR = before
     return cast("Function", compiled)
 
 

@@ -14,7 +14,7 @@ class Lander:
     """A point-mass lander with one throttled engine.
 
     Attributes:
-        dry_mass: [kg] mass with an empty tank. The propellant on board belongs to the `State` (mass - dry_mass).
+        dry_mass: [kg] mass with an empty tank. The propellant on board is the state's: mass - dry_mass.
         max_thrust: [N] greatest thrust.
         specific_impulse: [s] referred to standard gravity, 9.80665 m/s^2.
         min_thrust: [N] least thrust while the engine burns.

@@ -28,7 +28,7 @@ def finite_number(
     at_least: float = -math.inf,
     at_most: float = math.inf,
 ) -> float:
-    """Return `value` as a float inside (above, inf) and [at_least, at_most]; raise ValueError naming `name`."""
+    """Return `value` as a float in (above, inf) and [at_least, at_most]; raise ValueError naming `name`."""
     try:
         number = float(value)
     except (TypeError, ValueError) as error:

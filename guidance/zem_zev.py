@@ -8,8 +8,8 @@ optimal for the integral of |a|^2/2 at K_R = 6, K_V = 2. The time to go is the s
 
     (W + |g|^2/2) t^4 - 2 (v.v + v_f.v + v_f.v_f) t^2 + 12 (r_f - r).(v + v_f) t - 18 |r_f - r|^2 = 0,
 
-the stationarity condition of the integral of (|a|^2/2 + W) over the flight time (D'Souza 1997). The paper prints it
-with |g|^2 in front of t^4, which is W = |g|^2/2 and not, as it says, the energy-optimal W = 0.
+the stationarity condition of the integral of (|a|^2/2 + W) over the flight time (D'Souza 1997). The paper
+prints it with |g|^2 in front of t^4, which is W = |g|^2/2 and not, as it says, the energy-optimal W = 0.
 """
 
 from __future__ import annotations
@@ -54,8 +54,9 @@ def _bracketed_root(low: float, high: float, beta: float, delta: float, epsilon:
 def _first_rise(beta: float, delta: float, epsilon: float) -> float:
     """Smallest positive root of t^4 - beta t^2 + delta t - epsilon; beta >= 0, epsilon > 0.
 
-    The quartic starts at -epsilon. Its stationary points solve t^3 - (beta/2) t + delta/4 = 0; with three of them
-    the middle one is a local maximum, and the first root lies before it if the quartic is not negative there.
+    The quartic starts at -epsilon. Its stationary points solve t^3 - (beta/2) t + delta/4 = 0; with three of
+    them the middle one is a local maximum, and the first root lies before it unless the quartic is negative
+    there.
     """
     low = 0.0
     third = beta / 6.0
@@ -144,7 +145,7 @@ def quartic_fourth_power(gravity: NDArray[np.float64], time_weight: float | None
     half_square = 0.5 * float(gravity @ gravity)
     weight = half_square if time_weight is None else finite_number("time_weight", time_weight, at_least=0.0)
     if weight + half_square <= 0.0:
-        raise ValueError("time_weight must be above zero where there is no gravity: no finite time to go exists")
+        raise ValueError("time_weight must be above zero where there is no gravity: no time to go is finite")
     return weight + half_square
 
 
@@ -155,7 +156,7 @@ def time_to_go(
     target_velocity: ArrayLike = (0.0, 0.0, 0.0),
     time_weight: float | None = None,
 ) -> float:
-    """Time to go that a ZEM/ZEV flight to `target` should take: smallest positive root of the paper's quartic.
+    """Time to go for a ZEM/ZEV flight to `target`: smallest positive root of the paper's quartic.
 
     Args:
         state: present state; its mass does not matter.
@@ -170,7 +171,7 @@ def time_to_go(
         [s]; zero only at rest on the target.
 
     Raises:
-        ValueError: an argument is not finite or of the wrong shape, or neither gravity nor weight ends the flight.
+        ValueError: an argument is not finite or of the wrong shape, or gravity and weight are both zero.
     """
     pull = finite_vector("gravity", gravity, 3)
     return solve_time_to_go(
@@ -189,7 +190,7 @@ def zem_zev_acceleration(
     gains: tuple[float, float] = (6.0, 2.0),
     gravity: ArrayLike = MOON_GRAVITY,
 ) -> NDArray[np.float64]:
-    """Commanded thrust acceleration of ZEM/ZEV guidance to rest at `target` (module docstring, first equation).
+    """Commanded thrust acceleration of ZEM/ZEV guidance to rest at `target` (the module's first equation).
 
     Args:
         state: present state.
