@@ -1,0 +1,59 @@
+# `make compare` and `make test` each set up .venv by themselves. Needs make and Python 3.11 or newer.
+#
+#   PYTHON=python3.12 make test            another interpreter
+#   make compare ARGS="--episodes 100"     arguments of studies.compare
+#   make test ARGS="-k lander"             arguments of pytest (also for test-all)
+
+PYTHON ?= python3
+ARGS ?=
+VENV := .venv
+BIN := $(VENV)/bin
+PIP_INSTALL := $(BIN)/python -m pip --disable-pip-version-check install
+
+.DEFAULT_GOAL := help
+.NOTPARALLEL:
+.PHONY: help setup lint test test-all compare bench clean
+
+help:  ## list the targets
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-9s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+
+setup: $(VENV)/.installed-dev  ## create .venv with everything that a developer needs
+
+lint: $(VENV)/.installed-dev  ## ruff, ruff format, pyright, import contracts
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/pyright
+	$(BIN)/lint-imports
+
+test: lint  ## lint, then the fast tests
+	$(BIN)/pytest -m "not slow and not browser" -n 2 $(ARGS)
+
+test-all: lint  ## lint, then every test
+	$(BIN)/pytest -n 2 $(ARGS)
+
+compare: $(VENV)/.installed  ## fly every policy on the same episodes and print the table
+	$(BIN)/python -m studies.compare $(ARGS)
+
+bench: $(VENV)/.installed  ## measure the speed of the inner loops
+	$(BIN)/python -m studies.bench $(ARGS)
+
+clean:  ## remove .venv, caches and build products; results and the per-user terrain cache stay
+	rm -rf $(VENV) build dist .pytest_cache .ruff_cache .hypothesis .import_linter_cache
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+$(BIN)/python:
+	@command -v "$(PYTHON)" >/dev/null || { \
+	    echo "error: no interpreter named '$(PYTHON)'; install Python 3.11 or newer, or run: make PYTHON=/path/to/python3.11 ..." >&2; exit 1; }
+	@"$(PYTHON)" -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
+	    echo "error: Python 3.11 or newer is needed, '$(PYTHON)' is $$("$(PYTHON)" --version 2>&1); run: make PYTHON=python3.11 ..." >&2; exit 1; }
+	@"$(PYTHON)" -c 'import ensurepip, venv' 2>/dev/null || { \
+	    echo "error: '$(PYTHON)' cannot make a virtual environment; on Debian or Ubuntu: apt-get install python3-venv" >&2; exit 1; }
+	"$(PYTHON)" -m venv $(VENV) || { rm -rf $(VENV); exit 1; }
+
+$(VENV)/.installed: pyproject.toml | $(BIN)/python
+	$(PIP_INSTALL) -e .
+	@touch $@
+
+$(VENV)/.installed-dev: pyproject.toml | $(BIN)/python
+	$(PIP_INSTALL) -e '.[dev]'
+	@touch $(VENV)/.installed $@
