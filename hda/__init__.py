@@ -1,1 +1,78 @@
-"""Placeholder."""
+"""The hazard-avoidance world: terrain, safety maps, the LIDAR, the simulator, and the policy seam.
+
+Frame: site-fixed, x east, y north, z up, metres; origin at the map's south-west corner; map[row, column] with row
+north and column east.
+"""
+
+from typing import TYPE_CHECKING
+
+from guidance.exports import lazy_exports
+
+if TYPE_CHECKING:
+    from hda.dtm_library import SPLITS, Ground, load_tile, prepare_tiles
+    from hda.episode import EpisodeRecord, fly
+    from hda.lidar import Lidar
+    from hda.observation import Observation, ScenarioView
+    from hda.outcome import Ending, Outcome
+    from hda.policy import Decision, DecisionStatus, Policy, PrivilegedPolicy, ZemZevCommand
+    from hda.presets import PRESETS, sample_scenario
+    from hda.registry import PolicyEntry, make_policy, policy_names, register_policy
+    from hda.safety_map import SafetyCriteria, SafetyMap, assess_safety
+    from hda.scenario import Preset, Rules, Scenario, StartConditions
+    from hda.terrain import TerrainParameters, generate_terrain
+    from hda.tile import Tile, make_tile
+
+_HOMES = {
+    "hda.dtm_library": ("SPLITS", "Ground", "load_tile", "prepare_tiles"),
+    "hda.episode": ("EpisodeRecord", "fly"),
+    "hda.lidar": ("Lidar",),
+    "hda.observation": ("Observation", "ScenarioView"),
+    "hda.outcome": ("Ending", "Outcome"),
+    "hda.policy": ("Decision", "DecisionStatus", "Policy", "PrivilegedPolicy", "ZemZevCommand"),
+    "hda.presets": ("PRESETS", "sample_scenario"),
+    "hda.registry": ("PolicyEntry", "make_policy", "policy_names", "register_policy"),
+    "hda.safety_map": ("SafetyCriteria", "SafetyMap", "assess_safety"),
+    "hda.scenario": ("Preset", "Rules", "Scenario", "StartConditions"),
+    "hda.terrain": ("TerrainParameters", "generate_terrain"),
+    "hda.tile": ("Tile", "make_tile"),
+}
+
+__all__ = [
+    "PRESETS",
+    "SPLITS",
+    "Decision",
+    "DecisionStatus",
+    "Ending",
+    "EpisodeRecord",
+    "Ground",
+    "Lidar",
+    "Observation",
+    "Outcome",
+    "Policy",
+    "PolicyEntry",
+    "Preset",
+    "PrivilegedPolicy",
+    "Rules",
+    "SafetyCriteria",
+    "SafetyMap",
+    "Scenario",
+    "ScenarioView",
+    "StartConditions",
+    "TerrainParameters",
+    "Tile",
+    "ZemZevCommand",
+    "assess_safety",
+    "fly",
+    "generate_terrain",
+    "load_tile",
+    "make_policy",
+    "make_tile",
+    "policy_names",
+    "prepare_tiles",
+    "register_policy",
+    "sample_scenario",
+]
+
+__getattr__, __dir__ = lazy_exports(
+    __name__, {name: home for home, names in _HOMES.items() for name in names}
+)

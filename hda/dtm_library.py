@@ -1,0 +1,193 @@
+"""The tiles of terrain that studies fly over: seeded, split, built on demand, cached per user.
+
+A tile's number is its seed. The splits never mix: training ground, ground to tune on, ground to evaluate on, and
+fresh ground for reliability runs. Every parameter of the terrain and of its assessment, and the format version, go
+into the cache key, so a change of any of them builds anew.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shutil
+import tempfile
+import zlib
+from collections.abc import Iterable
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from functools import lru_cache
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from guidance.kernel import cache_folder
+from hda.safety_map import SafetyCriteria
+from hda.terrain import TerrainParameters, generate_terrain
+from hda.tile import Tile, make_tile
+
+FORMAT_VERSION = 1
+SPLITS: dict[str, range] = {
+    "train": range(70),
+    "tuning": range(2000, 2060),
+    "validation": range(1000, 1018),
+    "fresh": range(10_000, 10_400),
+}
+"""Tile numbers: `train` for learning, `tuning` for every choice, `validation` and `fresh` for evaluation only."""
+
+_LAYERS = ("elevation", "probability", "deterministic")
+_verified: set[Path] = set()
+
+
+@dataclass(frozen=True)
+class Ground:
+    """What decides how a tile of a given number looks: the generator's and the assessment's parameters."""
+
+    terrain: TerrainParameters
+    criteria: SafetyCriteria
+
+    @property
+    def key(self) -> str:
+        """Cache key: a hash over every parameter and the format version."""
+        return hashlib.sha256(self.description().encode()).hexdigest()[:20]
+
+    def description(self) -> str:
+        """Every parameter as JSON, sorted."""
+        parts = {"format": FORMAT_VERSION, "terrain": asdict(self.terrain), "criteria": asdict(self.criteria)}
+        return json.dumps(parts, sort_keys=True, indent=1)
+
+    def folder(self) -> Path:
+        """Where this ground's tiles are kept."""
+        return cache_folder() / "terrain" / self.key
+
+
+def tile_numbers(split: str) -> range:
+    """Tile numbers of a split.
+
+    Raises:
+        ValueError: there is no such split.
+    """
+    if split not in SPLITS:
+        raise ValueError(f"split must be one of {', '.join(SPLITS)}, got {split!r}")
+    return SPLITS[split]
+
+
+def check_split(number: int, split: str) -> None:
+    """Raise ValueError if tile `number` does not belong to `split`, so that splits never mix."""
+    if number not in tile_numbers(split):
+        raise ValueError(f"tile {number} does not belong to split {split!r} ({SPLITS[split]})")
+
+
+def build_tile(ground: Ground, number: int) -> Tile:
+    """Generate and assess one tile, without the cache."""
+    rng = np.random.default_rng(number)
+    dem = generate_terrain(ground.terrain, rng)
+    return make_tile(dem, ground.criteria, number, ground.terrain.maximum_elevation)
+
+
+def load_tile(ground: Ground, number: int, split: str) -> Tile:
+    """Give one tile, memory-mapped from the cache; it is built, or built anew if corrupt, on demand.
+
+    Raises:
+        ValueError: the tile does not belong to the split.
+    """
+    check_split(number, split)
+    return _open_or_build(ground, number)
+
+
+def prepare_tiles(ground: Ground, split: str, workers: int = 2, numbers: Iterable[int] | None = None) -> None:
+    """Build the missing tiles of a split in parallel, with a progress bar.
+
+    Args:
+        ground: generator's and assessment's parameters.
+        split: name of the split.
+        workers: processes.
+        numbers: only these tiles of the split; all of it by default.
+
+    Raises:
+        ValueError: a number does not belong to the split.
+    """
+    wanted = list(tile_numbers(split) if numbers is None else numbers)
+    for number in wanted:
+        check_split(number, split)
+    missing = [number for number in wanted if not _tile_folder(ground, number).exists()]
+    if not missing:
+        return
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns) as progress:
+        task = progress.add_task(f"building {split} terrain", total=len(missing))
+        if workers == 1 or len(missing) == 1:
+            for number in missing:
+                _open_or_build(ground, number)
+                progress.advance(task)
+            return
+        with ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_use_one_thread) as pool:
+            futures = [pool.submit(_build_and_store, ground, number) for number in missing]
+            for future in as_completed(futures):
+                future.result()
+                progress.advance(task)
+
+
+def _use_one_thread() -> None:
+    import numba
+
+    numba.set_num_threads(1)
+
+
+def _tile_folder(ground: Ground, number: int) -> Path:
+    return ground.folder() / f"tile-{number:05d}"
+
+
+def _build_and_store(ground: Ground, number: int) -> None:
+    _store(ground, build_tile(ground, number))
+
+
+@lru_cache(maxsize=96)
+def _open_or_build(ground: Ground, number: int) -> Tile:
+    folder = _tile_folder(ground, number)
+    tile = _read(folder, number)
+    if tile is not None:
+        return tile
+    shutil.rmtree(folder, ignore_errors=True)
+    built = build_tile(ground, number)
+    _store(ground, built)
+    return _read(folder, number) or built
+
+
+def _store(ground: Ground, tile: Tile) -> None:
+    """Write a tile under a temporary name and move it into place, so that no reader sees half of it."""
+    folder = _tile_folder(ground, tile.number)
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        (folder.parent / "parameters.json").write_text(ground.description())
+        draft = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
+    except OSError:
+        return  # no place to keep it: the tile lives in memory
+    sums: dict[str, int] = {}
+    for name in _LAYERS:
+        layer = getattr(tile, name)
+        np.save(draft / f"{name}.npy", layer, allow_pickle=False)
+        sums[name] = zlib.crc32(np.ascontiguousarray(layer).tobytes())
+    (draft / "checksums.json").write_text(json.dumps(sums, sort_keys=True))
+    try:
+        os.replace(draft, folder)
+    except OSError:
+        shutil.rmtree(draft, ignore_errors=True)  # another process was first
+
+
+def _read(folder: Path, number: int) -> Tile | None:
+    """Map a stored tile; None where there is none or it is damaged. Checksums are tested once per process."""
+    layers = {}
+    with suppress(OSError, ValueError, KeyError, TypeError):
+        sums = json.loads((folder / "checksums.json").read_text())
+        for name in _LAYERS:
+            layers[name] = np.load(folder / f"{name}.npy", mmap_mode="r", allow_pickle=False).view(np.ndarray)
+            if folder not in _verified and zlib.crc32(layers[name]) != sums[name]:
+                return None
+        tile = Tile(number=number, **layers)
+        _verified.add(folder)
+        return tile
+    return None

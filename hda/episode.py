@@ -1,0 +1,252 @@
+"""Flying one episode: look, decide, fly five seconds, again, until the ground.
+
+`begin_flight`, `observe` and `advance` are the steps; `fly` and the Gymnasium environment both call them.
+"""
+
+from __future__ import annotations
+
+import time as clock
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from guidance.state import State
+from guidance.zem_zev import time_to_go
+from hda.lidar import look
+from hda.observation import Observation
+from hda.outcome import Outcome, RewardTerms, classify, score_step
+from hda.policy import Decision, Policy, PrivilegedPolicy
+from hda.scenario import Scenario
+from hda.vehicle import FlightStatus, Segment, fly_interval
+
+
+@dataclass(frozen=True, eq=False)
+class Flight:
+    """Where an episode stands before a look.
+
+    Attributes:
+        index: number of the decision to come.
+        state: present state.
+        target: [m] shape (3,), current target.
+        time_to_go: [s] what remains of the commanded time to go.
+    """
+
+    index: int
+    state: State
+    target: NDArray[np.float64]
+    time_to_go: float
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """What one decision led to.
+
+    Attributes:
+        flight: where the episode stands after it.
+        segment: the flown path.
+        outcome: how the episode ended, or None while it goes on.
+        truncated: the episode was cut after the last decision, still in flight.
+        reward: named terms of the reward.
+        slant_angle: [rad] least elevation of the lander seen from the target, before and after retargeting.
+    """
+
+    flight: Flight
+    segment: Segment
+    outcome: Outcome | None
+    truncated: bool
+    reward: RewardTerms
+    slant_angle: float
+
+
+@dataclass(frozen=True, eq=False)
+class EpisodeRecord:
+    """One flown episode. n nodes have n - 1 intervals.
+
+    Attributes:
+        policy: name of the policy.
+        scenario: what was flown.
+        observations: every look, in order.
+        decisions: every decision, in order.
+        segments: the flown path after each decision, at the control rate.
+        rewards: reward terms of each decision.
+        outcome: how it ended.
+        minimum_slant_angle: [rad] least elevation of the lander seen from the current target at decision instants.
+        decision_time: [s] shape (decisions,), wall time that the policy took; not reproducible.
+    """
+
+    policy: str
+    scenario: Scenario
+    observations: tuple[Observation, ...]
+    decisions: tuple[Decision, ...]
+    segments: tuple[Segment, ...]
+    rewards: tuple[RewardTerms, ...]
+    outcome: Outcome
+    minimum_slant_angle: float
+    decision_time: NDArray[np.float64]
+
+    @property
+    def time(self) -> NDArray[np.float64]:
+        """[s] shape (n,), time of each node."""
+        parts = [self.observations[k].time + s.time[:-1] for k, s in enumerate(self.segments)]
+        last = self.observations[len(self.segments) - 1].time + self.segments[-1].time[-1:]
+        return np.concatenate([*parts, last])
+
+    @property
+    def path(self) -> NDArray[np.float64]:
+        """Shape (n, 7): position [m], velocity [m/s] and mass [kg] at each node."""
+        return np.concatenate([*(s.path[:-1] for s in self.segments), self.segments[-1].path[-1:]])
+
+    @property
+    def position(self) -> NDArray[np.float64]:
+        """[m] shape (n, 3)."""
+        return self.path[:, :3]
+
+    @property
+    def velocity(self) -> NDArray[np.float64]:
+        """[m/s] shape (n, 3)."""
+        return self.path[:, 3:6]
+
+    @property
+    def mass(self) -> NDArray[np.float64]:
+        """[kg] shape (n,)."""
+        return self.path[:, 6]
+
+    @property
+    def commanded_thrust(self) -> NDArray[np.float64]:
+        """[N] shape (n - 1, 3), saturated command held over each interval."""
+        return np.concatenate([s.commanded for s in self.segments])
+
+    @property
+    def thrust(self) -> NDArray[np.float64]:
+        """[N] shape (n - 1, 3), applied over each interval: the command with the thrust error."""
+        return np.concatenate([s.commanded * (1.0 + s.thrust_error) for s in self.segments])
+
+    @property
+    def maximum_thrust(self) -> float:
+        """[N] greatest applied thrust."""
+        return float(np.sqrt((self.thrust**2).sum(axis=1).max()))
+
+    @property
+    def total_reward(self) -> float:
+        """Sum of the rewards, undiscounted."""
+        return float(sum(terms.total for terms in self.rewards))
+
+    @property
+    def fallbacks(self) -> int:
+        """Decisions that fell back from the policy's own law."""
+        return sum(decision.status.is_fallback for decision in self.decisions)
+
+
+def elevation_angle(position: NDArray[np.float64], target: NDArray[np.float64]) -> float:
+    """[rad] elevation of `position` seen from `target` (both shape (3,)): 90 degrees is overhead."""
+    offset = position - target
+    return float(np.arctan2(offset[2], np.hypot(offset[0], offset[1])))
+
+
+def begin_flight(scenario: Scenario) -> Flight:
+    """Stand at t = 0: first target, and the time to go of the quartic to it."""
+    state = scenario.initial_state
+    target = scenario.nominal_target
+    return Flight(0, state, target, time_to_go(state, target, scenario.preset.gravity))
+
+
+def observe(scenario: Scenario, flight: Flight) -> Observation:
+    """Take the look of this instant; its noise depends on the episode and the number of the look only."""
+    lidar = scenario.preset.lidar
+    position = flight.state.position
+    noise = scenario.streams.look(flight.index, lidar.pixels)
+    return Observation(
+        index=flight.index,
+        time=flight.index * scenario.preset.rules.decision_interval,
+        state=flight.state,
+        target=flight.target,
+        safety_map=look(lidar, position, flight.target, scenario.tile.probability, noise),
+        width=lidar.width(position, flight.target),
+        time_to_go=flight.time_to_go,
+    )
+
+
+def advance(scenario: Scenario, flight: Flight, decision: Decision) -> Step:
+    """Fly a decision until the next look, the ground, or the end of the episode.
+
+    Raises:
+        ValueError: the decision's site is not on the target plane.
+    """
+    preset = scenario.preset
+    rules = preset.rules
+    plane = scenario.nominal_target[2]
+    if abs(decision.site[2] - plane) > 1e-6:
+        raise ValueError(f"site must lie on the target plane z = {plane:g} m, got z = {decision.site[2]:g} m")
+    position = flight.state.position
+    slant = min(elevation_angle(position, flight.target), elevation_angle(position, decision.site))
+    segment = fly_interval(
+        flight.state,
+        decision,
+        preset.lander,
+        np.array(preset.gravity),
+        (rules.control_period, rules.control_periods),
+        scenario.streams.thrust_error(flight.index, rules.thrust_error),
+    )
+    after = Flight(flight.index + 1, segment.final_state, decision.site, segment.time_to_go)
+    landed = segment.status is not FlightStatus.FLYING
+    truncated = not landed and after.index >= rules.max_decisions
+    initial = scenario.initial_state
+    outcome = None
+    if landed or truncated:
+        ground = (
+            landed,
+            landed and scenario.tile.is_safe(after.state.position),
+            segment.status is FlightStatus.TANK_EMPTY,
+        )
+        outcome = classify(initial, after.state, decision.site, ground, (preset.lander, rules))
+    burnt = (flight.state.mass - after.state.mass) / (initial.mass - preset.lander.dry_mass)
+    return Step(after, segment, outcome, truncated, score_step(burnt, outcome), slant)
+
+
+def fly(policy: Policy[Any] | PrivilegedPolicy, scenario: Scenario) -> EpisodeRecord:
+    """Fly one episode.
+
+    Args:
+        policy: any policy; a privileged one is first given the true map.
+        scenario: what to fly.
+
+    Returns:
+        The record; equal for equal arguments, but for `decision_time`.
+
+    Raises:
+        ValueError: the policy returns something that is not a Decision, or a site off the target plane.
+    """
+    pilot = policy.informed(scenario.tile) if isinstance(policy, PrivilegedPolicy) else policy
+    memory = pilot.begin(scenario.view, scenario.streams.policy())
+    flight = begin_flight(scenario)
+    observations: list[Observation] = []
+    decisions: list[Decision] = []
+    steps: list[Step] = []
+    durations: list[float] = []
+    while not steps or steps[-1].outcome is None:
+        observation = observe(scenario, flight)
+        started = clock.perf_counter()
+        decision, memory = pilot.decide(observation, memory)
+        durations.append(clock.perf_counter() - started)
+        if not isinstance(decision, Decision):
+            raise ValueError(f"policy {policy.name!r} must return a Decision, got {type(decision).__name__}")
+        step = advance(scenario, flight, decision)
+        flight = step.flight
+        observations.append(observation)
+        decisions.append(decision)
+        steps.append(step)
+    outcome = steps[-1].outcome
+    assert outcome is not None
+    return EpisodeRecord(
+        policy=policy.name,
+        scenario=scenario,
+        observations=tuple(observations),
+        decisions=tuple(decisions),
+        segments=tuple(step.segment for step in steps),
+        rewards=tuple(step.reward for step in steps),
+        outcome=outcome,
+        minimum_slant_angle=min(step.slant_angle for step in steps),
+        decision_time=np.array(durations),
+    )

@@ -1,0 +1,109 @@
+"""The safety map that the LIDAR gives at one look: the paper's Algorithm 2.
+
+A square, axis-aligned window of 64 x 64 pixels, centred on the current target, width w = r_s tan(field of view). Each
+pixel takes the probability of safety at the nearest cell of the true map, plus Gaussian noise in proportion to
+the range, clipped to [0, 1]. Pixels seen too far from the vertical, and outside the map, read 0.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from guidance.kernel import compile_kernel
+from guidance.validation import finite_number
+
+
+@dataclass(frozen=True)
+class Lidar:
+    """The sensor model (paper, "Observation Data Generation").
+
+    Attributes:
+        field_of_view: [rad] w = range x tan(field_of_view).
+        pixels: pixels along each side of the look.
+        noise: standard deviation of the observed probability at `noise_range`, growing with range.
+        noise_range: [m] range to which `noise` refers.
+        off_nadir_limit: [rad] pixels further than this from the lander's vertical read 0 (slant angle under 70 deg).
+    """
+
+    field_of_view: float = math.radians(11.4)
+    pixels: int = 64
+    noise: float = 0.05
+    noise_range: float = 500.0
+    off_nadir_limit: float = math.radians(20.0)
+
+    def __post_init__(self) -> None:
+        """Refuse a sensor that cannot exist."""
+        finite_number("field_of_view", self.field_of_view, above=0.0, at_most=math.radians(89.0))
+        finite_number("noise", self.noise, at_least=0.0)
+        finite_number("noise_range", self.noise_range, above=0.0)
+        finite_number("off_nadir_limit", self.off_nadir_limit, above=0.0, at_most=math.radians(89.0))
+        if self.pixels < 2:
+            raise ValueError(f"pixels must be at least 2, got {self.pixels}")
+
+    def width(self, position: NDArray[np.float64], target: NDArray[np.float64]) -> float:
+        """[m] side of the field of view when `position` looks at `target`, both shape (3,)."""
+        return float(np.linalg.norm(position - target)) * math.tan(self.field_of_view)
+
+
+@compile_kernel
+def _look_into(
+    position: NDArray[np.float64],
+    target: NDArray[np.float64],
+    probability: NDArray[np.float32],
+    noise: NDArray[np.float32],
+    sensor: tuple[float, float, float],
+    out: NDArray[np.float32],
+) -> None:
+    """Fill `out` with the observed map; `sensor` = (width m, noise per metre of range, tan of off-nadir limit)."""
+    width, noise_per_metre, limit = sensor
+    rows, columns = probability.shape
+    n = out.shape[0]
+    height = position[2] - target[2]
+    reach_squared = (limit * height) ** 2
+    for i in range(n):
+        y = target[1] + ((i + 0.5) / n - 0.5) * width
+        row = math.floor(y)
+        dy = y - position[1]
+        for j in range(n):
+            x = target[0] + ((j + 0.5) / n - 0.5) * width
+            column = math.floor(x)
+            dx = x - position[0]
+            across = dx * dx + dy * dy
+            value = 0.0
+            if across <= reach_squared and 0 <= row < rows and 0 <= column < columns:
+                deviation = noise_per_metre * math.sqrt(across + height * height)
+                value = min(1.0, max(0.0, probability[row, column] + deviation * noise[i, j]))
+            out[i, j] = value
+
+
+def look(
+    lidar: Lidar,
+    position: NDArray[np.float64],
+    target: NDArray[np.float64],
+    probability: NDArray[np.float32],
+    noise: NDArray[np.float32],
+) -> NDArray[np.float32]:
+    """Observe the safety map around `target` (Algorithm 2).
+
+    Args:
+        lidar: the sensor.
+        position: [m] shape (3,), lander; above the target.
+        target: [m] shape (3,), centre of the field of view, on the target plane.
+        probability: shape (rows, columns), V_P of the true map at 1 m a cell; row 0 is the south edge.
+        noise: standard normal, shape (pixels, pixels).
+
+    Returns:
+        Shape (pixels, pixels) in [0, 1]; row i grows north, column j east.
+    """
+    out = np.empty((lidar.pixels, lidar.pixels), dtype=np.float32)
+    sensor = (
+        lidar.width(position, target),
+        lidar.noise / lidar.noise_range,
+        math.tan(lidar.off_nadir_limit),
+    )
+    _look_into(position, target, probability, noise, sensor, out)
+    return out

@@ -1,0 +1,87 @@
+"""All that a policy may know at a decision."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from guidance.lander import Lander
+from guidance.state import State
+
+
+@dataclass(frozen=True, eq=False)
+class ScenarioView:
+    """What a policy may know of a scenario before the first look; never the true map.
+
+    Attributes:
+        lander: the vehicle.
+        gravity: [m/s^2] shape (3,).
+        nominal_target: [m] shape (3,), the first target, on the target plane.
+        decision_interval: [s] time between looks.
+        control_period: [s] time over which a thrust is held.
+        field_of_view: [rad] the look's width is the slant range times its tangent.
+        off_nadir_limit: [rad] pixels further than this from the vertical read 0.
+    """
+
+    lander: Lander
+    gravity: NDArray[np.float64]
+    nominal_target: NDArray[np.float64]
+    decision_interval: float
+    control_period: float
+    field_of_view: float
+    off_nadir_limit: float
+
+
+@dataclass(frozen=True, eq=False)
+class Observation:
+    """One look and the state at which it was taken.
+
+    Attributes:
+        index: number of the decision, from 0.
+        time: [s] since the start.
+        state: position, velocity and mass.
+        target: [m] shape (3,), current target: the centre of the look.
+        safety_map: shape (n, n), observed probability of safety, row i grows north, column j east.
+        width: [m] side of the square look.
+        time_to_go: [s] what remains of the commanded time to go.
+    """
+
+    index: int
+    time: float
+    state: State
+    target: NDArray[np.float64]
+    safety_map: NDArray[np.float32]
+    width: float
+    time_to_go: float
+
+    @property
+    def pixel_size(self) -> float:
+        """[m] side of one pixel."""
+        return self.width / self.safety_map.shape[0]
+
+    @property
+    def pixel_offset(self) -> NDArray[np.float64]:
+        """[m] shape (n,), offset of pixel i (north) or j (east) from the target: ((i + 1/2)/n - 1/2) w."""
+        n = self.safety_map.shape[0]
+        return ((np.arange(n) + 0.5) / n - 0.5) * self.width
+
+    def site(self, row: int, column: int) -> NDArray[np.float64]:
+        """[m] shape (3,), centre of pixel (row, column) on the target plane."""
+        n = self.safety_map.shape[0]
+        return np.array(
+            [
+                self.target[0] + ((column + 0.5) / n - 0.5) * self.width,
+                self.target[1] + ((row + 0.5) / n - 0.5) * self.width,
+                self.target[2],
+            ]
+        )
+
+    def pixel(self, site: NDArray[np.float64]) -> tuple[int, int] | None:
+        """(row, column) of the pixel that contains `site` (its x and y count), or None outside the look."""
+        n = self.safety_map.shape[0]
+        row = math.floor(((site[1] - self.target[1]) / self.width + 0.5) * n)
+        column = math.floor(((site[0] - self.target[0]) / self.width + 0.5) * n)
+        return (row, column) if 0 <= row < n and 0 <= column < n else None

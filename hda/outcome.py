@@ -1,0 +1,157 @@
+"""How an episode ended, and what that is worth: pure functions of a flight."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from guidance.lander import Lander
+from guidance.state import State
+from hda.scenario import Rules
+
+
+class Ending(StrEnum):
+    """One word for the end of an episode, the gravest that holds."""
+
+    SUCCESS = "success"
+    """Safe ground, soft touchdown, propellant left."""
+    HARD_LANDING = "hard-landing"
+    """Safe ground, but faster than the soft speed."""
+    UNSAFE_SITE = "unsafe-site"
+    """Landed on a hazard or outside the map."""
+    CRASH = "crash"
+    """Touchdown above the crash speed."""
+    TANK_EMPTY = "tank-empty"
+    """The propellant ran out before touchdown."""
+    TIMED_OUT = "timed-out"
+    """Still in flight after the last decision."""
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What is known at the end of an episode.
+
+    Attributes:
+        ending: one word for it.
+        touchdown: [m] shape (3,), where the target plane was crossed (or the last position, if timed out).
+        safe_site: the touchdown cell is safe, the paper's ratio; false if timed out.
+        success: safe site, soft touchdown, propellant left, no crash.
+        miss_distance: [m] from the touchdown to the last target.
+        touchdown_speed: [m/s].
+        propellant_fraction: propellant burnt over propellant at the start.
+    """
+
+    ending: Ending
+    touchdown: NDArray[np.float64]
+    safe_site: bool
+    success: bool
+    miss_distance: float
+    touchdown_speed: float
+    propellant_fraction: float
+
+
+def classify(
+    initial: State,
+    final: State,
+    target: NDArray[np.float64],
+    ground: tuple[bool, bool, bool],
+    vehicle: tuple[Lander, Rules],
+) -> Outcome:
+    """Judge the end of a flight.
+
+    Args:
+        initial: state at t = 0.
+        final: state at the crossing of the plane, or after the last decision.
+        target: [m] shape (3,), the last target.
+        ground: (the plane was crossed, the cell there is safe, the tank ran dry before).
+        vehicle: the lander, and the rules that set the speed limits.
+    """
+    landed, safe, empty = ground
+    lander, rules = vehicle
+    speed = float(np.linalg.norm(final.velocity))
+    horizontal = math.hypot(final.velocity[0], final.velocity[1])
+    soft = abs(final.velocity[2]) <= rules.soft_speed and horizontal <= rules.soft_speed
+    safe_site = landed and safe
+    if not landed:
+        ending = Ending.TIMED_OUT
+    elif empty:
+        ending = Ending.TANK_EMPTY
+    elif speed > rules.crash_speed:
+        ending = Ending.CRASH
+    elif not safe_site:
+        ending = Ending.UNSAFE_SITE
+    elif not soft:
+        ending = Ending.HARD_LANDING
+    else:
+        ending = Ending.SUCCESS
+    return Outcome(
+        ending=ending,
+        touchdown=final.position.copy(),
+        safe_site=safe_site,
+        success=ending is Ending.SUCCESS,
+        miss_distance=float(np.linalg.norm(final.position - target)),
+        touchdown_speed=speed,
+        propellant_fraction=(initial.mass - final.mass) / (initial.mass - lander.dry_mass),
+    )
+
+
+@dataclass(frozen=True)
+class RewardWeights:
+    """The paper's reward weights, applied with the signs it means (penalties lower the reward).
+
+    Attributes:
+        propellant: per fraction of the propellant (alpha_m).
+        failure: for a crash or an empty tank (alpha_f).
+        speed: per m/s at the end (alpha_v).
+        miss: per metre from the last target at the end (alpha_r).
+        safety: for safe ground, lost on unsafe ground (alpha_s).
+    """
+
+    propellant: float = 1.0
+    failure: float = -10.0
+    speed: float = 0.1
+    miss: float = 0.01
+    safety: float = 1.0
+
+
+@dataclass(frozen=True)
+class RewardTerms:
+    """The named parts of one step's reward, each already weighted and signed."""
+
+    propellant: float = 0.0
+    failure: float = 0.0
+    speed: float = 0.0
+    miss: float = 0.0
+    safety: float = 0.0
+
+    @property
+    def total(self) -> float:
+        """Sum of the terms."""
+        return self.propellant + self.failure + self.speed + self.miss + self.safety
+
+
+def score_step(
+    propellant_fraction: float, outcome: Outcome | None, weights: RewardWeights = RewardWeights()
+) -> RewardTerms:
+    """Reward of one decision interval (paper, equation of r_t, signs as meant).
+
+    Args:
+        propellant_fraction: propellant burnt in the interval over propellant at the start of the episode.
+        outcome: the outcome if the interval ended the episode, else None.
+        weights: weights of the terms.
+    """
+    propellant = -weights.propellant * propellant_fraction
+    if outcome is None:
+        return RewardTerms(propellant=propellant)
+    failed = outcome.ending in (Ending.CRASH, Ending.TANK_EMPTY)
+    return RewardTerms(
+        propellant=propellant,
+        failure=weights.failure if failed else 0.0,
+        speed=-weights.speed * outcome.touchdown_speed,
+        miss=-weights.miss * outcome.miss_distance,
+        safety=weights.safety if outcome.safe_site else -weights.safety,
+    )

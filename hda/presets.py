@@ -1,0 +1,67 @@
+"""The named settings of the benchmark, and scenarios drawn from them.
+
+The numbers of `paper` and `hard` come from `python -m studies.calibrate` on the tuning tiles; the README shows what
+they give beside the paper's row.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+from hda.dtm_library import Ground, load_tile, tile_numbers
+from hda.random_streams import EpisodeStreams
+from hda.scenario import Preset, Scenario, draw_scenario
+
+PRESETS: dict[str, Preset] = {
+    "paper": Preset(name="paper"),
+}
+
+
+def find_preset(preset: str | Preset) -> Preset:
+    """Give the preset of a name (a Preset passes through).
+
+    Raises:
+        ValueError: there is no such preset; the nearest valid names are given.
+    """
+    if isinstance(preset, Preset):
+        return preset
+    if preset not in PRESETS:
+        raise ValueError(unknown_name("preset", preset, PRESETS))
+    return PRESETS[preset]
+
+
+def unknown_name(kind: str, name: object, valid: Iterable[str]) -> str:
+    """Say that a name is unknown, with the nearest valid names first."""
+    names = sorted(valid)
+    near = difflib.get_close_matches(str(name), names, n=3, cutoff=0.4)
+    hint = f"; did you mean {' or '.join(near)}?" if near else ""
+    return f"unknown {kind} {name!r}{hint} (valid: {', '.join(names)})"
+
+
+def sample_scenario(
+    preset: str | Preset = "paper", study_seed: int = 0, episode: int = 0, split: str = "validation"
+) -> Scenario:
+    """Draw episode `episode` of the study `study_seed`: always the same, whatever else is drawn.
+
+    Args:
+        preset: name of a preset, or a Preset.
+        study_seed: seed of the study, at least zero.
+        episode: number of the episode, at least zero.
+        split: train, tuning, validation or fresh; evaluation belongs on the last two.
+
+    Returns:
+        The scenario. Its tile is built on first use and cached.
+
+    Raises:
+        ValueError: unknown preset or split, or a negative seed or episode.
+    """
+    setting = find_preset(preset)
+    ground = Ground(setting.terrain, setting.criteria)
+    return draw_scenario(
+        setting,
+        EpisodeStreams(study_seed, episode),
+        split,
+        tile_numbers(split),
+        lambda number: load_tile(ground, number, split),
+    )

@@ -1,0 +1,58 @@
+"""Common random numbers: what chance does to an episode, whatever the policy does.
+
+`SeedSequence([study_seed, episode]).spawn(4)` gives the scenario, sensor, actuator and policy streams. Look k and
+interval k draw from children of their own, keyed by k, so that two policies that fly the same episode meet the
+same noise at the same look, even if one of them draws more or flies longer.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+_SCENARIO, _SENSOR, _ACTUATOR, _POLICY = range(4)
+
+
+@dataclass(frozen=True)
+class EpisodeStreams:
+    """The four random streams of one episode.
+
+    Attributes:
+        study_seed: seed of the whole study, at least zero.
+        episode: number of the episode within the study, at least zero.
+
+    Raises:
+        ValueError: a field is not a whole number of at least zero.
+    """
+
+    study_seed: int
+    episode: int
+
+    def __post_init__(self) -> None:
+        """Refuse what SeedSequence would refuse later, with a name."""
+        for name in ("study_seed", "episode"):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 0:
+                raise ValueError(f"{name} must be a whole number of at least 0, got {value!r}")
+
+    def _generator(self, *key: int) -> np.random.Generator:
+        sequence = np.random.SeedSequence((int(self.study_seed), int(self.episode)), spawn_key=key)
+        return np.random.Generator(np.random.PCG64(sequence))
+
+    def scenario(self) -> np.random.Generator:
+        """Stream of the tile, the first target and the initial state."""
+        return self._generator(_SCENARIO)
+
+    def policy(self) -> np.random.Generator:
+        """Stream that a policy may draw from."""
+        return self._generator(_POLICY)
+
+    def look(self, index: int, pixels: int) -> NDArray[np.float32]:
+        """Standard normal noise of look `index`, shape (pixels, pixels)."""
+        return self._generator(_SENSOR, index).standard_normal((pixels, pixels), dtype=np.float32)
+
+    def thrust_error(self, index: int, bound: float) -> float:
+        """Relative thrust error of interval `index`, uniform in [-bound, bound]."""
+        return float(self._generator(_ACTUATOR, index).uniform(-bound, bound))

@@ -1,0 +1,253 @@
+"""The vehicle between two looks: it flies a command at the control rate and saturates the thrust.
+
+At each control instant the law gives a thrust, the engine saturates it, applies it with this interval's relative
+error, and holds it for one control period; motion under a held thrust is exact (`guidance.dynamics`). When the time
+to go falls to half a control period the engine is cut off and the vehicle falls freely to the target plane. The
+flight ends where the plane is crossed, whatever the engine does.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from guidance.dynamics import propagate_into
+from guidance.kernel import compile_kernel
+from guidance.lander import Lander
+from guidance.state import State
+from guidance.zem_zev import saturate_into, zem_zev_into
+from hda.policy import Decision
+
+
+class FlightStatus(IntEnum):
+    """Where an interval left the vehicle."""
+
+    FLYING = 0
+    TOUCHDOWN = 1
+    """The target plane was crossed."""
+    TANK_EMPTY = 2
+    """The tank ran dry above the plane; the vehicle then fell to it."""
+
+
+_FLYING, _TOUCHDOWN, _TANK_EMPTY = 0, 1, 2
+_Vehicle = tuple[float, float, float, float]  # min thrust, max thrust, exhaust velocity, dry mass
+
+
+@dataclass(frozen=True, eq=False)
+class Segment:
+    """Flight between two decisions, or up to the ground. n nodes have n - 1 intervals.
+
+    Attributes:
+        time: [s] shape (n,), since the decision.
+        path: shape (n, 7): position [m], velocity [m/s], mass [kg].
+        commanded: [N] shape (n - 1, 3), thrust after saturation, held over each interval.
+        time_to_go: [s] what remains at the last node.
+        thrust_error: relative error of the applied thrust over the whole segment.
+        status: where the vehicle is at the last node.
+    """
+
+    time: NDArray[np.float64]
+    path: NDArray[np.float64]
+    commanded: NDArray[np.float64]
+    time_to_go: float
+    thrust_error: float
+    status: FlightStatus
+
+    @property
+    def final_state(self) -> State:
+        """State at the last node."""
+        return State(self.path[-1, :3], self.path[-1, 3:6], float(self.path[-1, 6]))
+
+
+@compile_kernel
+def _fall_time(height: float, climb: float, pull: float) -> float:
+    """Time for a free fall through `height` >= 0, starting at vertical speed `climb`; pull > 0."""
+    root = math.sqrt(climb * climb + 2.0 * pull * height)
+    # both forms are exact; each avoids cancellation on its side
+    return (climb + root) / pull if climb >= 0.0 else 2.0 * height / (root - climb)
+
+
+@compile_kernel
+def _lowest_instant(
+    start: NDArray[np.float64],
+    thrust: NDArray[np.float64],
+    duration: float,
+    gravity: NDArray[np.float64],
+    exhaust_velocity: float,
+    out: NDArray[np.float64],
+) -> float:
+    """When the vertical velocity, negative at the start and positive at the end, passes zero."""
+    low = 0.0
+    high = duration
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        propagate_into(start, thrust, middle, gravity, exhaust_velocity, out)
+        if out[5] < 0.0:
+            low = middle
+        else:
+            high = middle
+    return high
+
+
+@compile_kernel
+def _hold(
+    start: NDArray[np.float64],
+    thrust: NDArray[np.float64],
+    duration: float,
+    gravity: NDArray[np.float64],
+    exhaust_velocity: float,
+    plane: float,
+    out: NDArray[np.float64],
+) -> tuple[float, bool]:
+    """Hold a thrust for `duration`, or until the plane is crossed: (time flown, whether it was crossed)."""
+    propagate_into(start, thrust, duration, gravity, exhaust_velocity, out)
+    high = duration
+    below = out[2] <= plane
+    if not below and start[5] < 0.0 < out[5] and start[2] + start[5] * duration < plane:
+        high = _lowest_instant(start, thrust, duration, gravity, exhaust_velocity, out)
+        propagate_into(start, thrust, high, gravity, exhaust_velocity, out)
+        below = out[2] <= plane
+        if not below:
+            propagate_into(start, thrust, duration, gravity, exhaust_velocity, out)
+    if not below:
+        return duration, False
+    low = 0.0
+    for _ in range(80):
+        middle = 0.5 * (low + high)
+        propagate_into(start, thrust, middle, gravity, exhaust_velocity, out)
+        if out[2] > plane:
+            low = middle
+        else:
+            high = middle
+    propagate_into(start, thrust, high, gravity, exhaust_velocity, out)
+    return high, True
+
+
+@compile_kernel
+def _fall(
+    start: NDArray[np.float64],
+    gravity: NDArray[np.float64],
+    plane: float,
+    out: NDArray[np.float64],
+) -> float:
+    """Fall freely to the plane; return the time it took."""
+    time = _fall_time(max(0.0, start[2] - plane), start[5], -gravity[2])
+    propagate_into(start, np.zeros(3), time, gravity, 1.0, out)
+    return time
+
+
+@compile_kernel
+def hold_period(
+    start: NDArray[np.float64],
+    commanded: NDArray[np.float64],
+    thrust_error: float,
+    duration: float,
+    gravity: NDArray[np.float64],
+    vehicle: _Vehicle,
+    plane: float,
+    out: NDArray[np.float64],
+) -> tuple[float, int]:
+    """Apply a saturated command for one period, ended early by the ground or the tank: (time flown, status)."""
+    applied = commanded * (1.0 + thrust_error)
+    flow = math.sqrt(applied[0] ** 2 + applied[1] ** 2 + applied[2] ** 2) / vehicle[2]
+    burn = duration
+    dry = flow * duration >= start[6] - vehicle[3] and flow > 0.0
+    if dry:
+        burn = (start[6] - vehicle[3]) / flow
+    flown, crossed = _hold(start, applied, burn, gravity, vehicle[2], plane, out)
+    if crossed:
+        return flown, _TOUCHDOWN
+    if dry:
+        flown += _fall(out.copy(), gravity, plane, out)
+        return flown, _TANK_EMPTY
+    return flown, _FLYING
+
+
+@compile_kernel
+def _fly_zem_zev(
+    start: NDArray[np.float64],
+    site: NDArray[np.float64],
+    gains: tuple[float, float],
+    clock: tuple[float, float, float],
+    thrust_error: float,
+    gravity: NDArray[np.float64],
+    vehicle: _Vehicle,
+    time: NDArray[np.float64],
+    path: NDArray[np.float64],
+    commanded: NDArray[np.float64],
+) -> tuple[int, int]:
+    """Fly one interval; `clock` = (time to go, its rate, control period). Returns (nodes written, status)."""
+    time_to_go, rate, period = clock
+    periods = commanded.shape[0] - 1
+    path[0] = start
+    time[0] = 0.0
+    for k in range(periods + 1):
+        remaining = time_to_go - rate * period * k
+        if remaining <= 0.5 * period:
+            commanded[k] = 0.0
+            time[k + 1] = time[k] + _fall(path[k], gravity, site[2], path[k + 1])
+            return k + 2, _TOUCHDOWN
+        if k == periods:
+            break
+        zem_zev_into(path[k], site, gains, remaining, gravity, commanded[k])
+        commanded[k] *= path[k, 6]
+        saturate_into(commanded[k], vehicle[0], vehicle[1])
+        flown, status = hold_period(
+            path[k], commanded[k], thrust_error, period, gravity, vehicle, site[2], path[k + 1]
+        )
+        time[k + 1] = time[k] + flown
+        if status != _FLYING:
+            return k + 2, status
+    return periods + 1, _FLYING
+
+
+def fly_interval(
+    state: State,
+    decision: Decision,
+    lander: Lander,
+    gravity: NDArray[np.float64],
+    interval: tuple[float, int],
+    thrust_error: float,
+) -> Segment:
+    """Fly a decision until the next look or the ground.
+
+    Args:
+        state: where the interval starts, above the plane of the decision's site.
+        decision: site and command.
+        lander: the vehicle, which saturates the thrust.
+        gravity: [m/s^2] shape (3,), pointing down.
+        interval: (control period [s], control periods to the next look).
+        thrust_error: relative error of the applied thrust over this interval.
+
+    Returns:
+        The flown segment.
+    """
+    period, periods = interval
+    command = decision.command
+    time = np.empty(periods + 2)
+    path = np.empty((periods + 2, 7))
+    commanded = np.empty((periods + 1, 3))
+    nodes, status = _fly_zem_zev(
+        state.as_array(),
+        decision.site,
+        (command.position_gain, command.velocity_gain),
+        (command.time_to_go, command.time_to_go_rate, period),
+        thrust_error,
+        gravity,
+        (lander.min_thrust, lander.max_thrust, lander.exhaust_velocity, lander.dry_mass),
+        time,
+        path,
+        commanded,
+    )
+    return Segment(
+        time=time[:nodes],
+        path=path[:nodes],
+        commanded=commanded[: nodes - 1],
+        time_to_go=command.time_to_go - command.time_to_go_rate * float(time[nodes - 1]),
+        thrust_error=thrust_error,
+        status=FlightStatus(status),
+    )
