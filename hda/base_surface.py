@@ -20,10 +20,11 @@ class BaseSurface:
     """A self-affine surface, stated as planetary surfaces usually are (Shepard et al. 2001, JGR 106, 32777).
 
     Attributes:
-        hurst: [-] Hurst exponent in (0, 1): the RMS height difference grows as step^hurst. 0.8 is an engineering
-            choice between mare and highland values.
-        rms_slope: [rad] atan of the RMS height difference over a 1 m step divided by the step, along a profile.
-            The lunar surface at 1 m without craters and rocks is gentle; 1.5 deg is an engineering choice.
+        hurst: [-] Hurst exponent in (0, 1): the RMS height difference grows as step^hurst. 0.8 is an
+            engineering choice between mare and highland values.
+        rms_slope: [rad] atan of the RMS height difference over a 1 m step divided by the step, along a
+            profile. The lunar surface at 1 m without craters and rocks is gentle; 1.5 deg is an engineering
+            choice.
 
     Raises:
         ValueError: a field is out of range.
@@ -60,8 +61,8 @@ def generate_base_surface(
 ) -> NDArray[np.float32]:
     """Draw heights [m] of a square of `size` cells of `pixel_size` [m], by spectral synthesis.
 
-    The power spectral density falls as frequency^-(2 hurst + 2). The RMS slope holds over the ensemble; a single
-    tile scatters about it.
+    The power spectral density falls as frequency^-(2 hurst + 2). The RMS slope holds over the ensemble; a
+    single tile scatters about it.
 
     Returns:
         (size, size) float32, [m], row north, column east.

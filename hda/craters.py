@@ -21,7 +21,8 @@ KILOMETRE = 1000.0
 STOPAR_DIAMETER = np.array([10.0, 40.0, 100.0, 200.0, 400.0])
 """[m] lower edges of the size classes of `STOPAR_DEPTH_RATIO`, which has one more class below 10 m."""
 STOPAR_DEPTH_RATIO = np.array([0.10, 0.11, 0.13, 0.15, 0.17, 0.21])
-"""[-] depth over diameter of fresh craters by size (Stopar et al. 2017; below 40 m its authors extrapolate)."""
+"""[-] depth over diameter of fresh craters by size (Stopar et al. 2017; below 40 m its authors
+extrapolate)."""
 FRESHNESS_RANGE = (0.15, 1.0)
 """[-] share of its fresh depth that a crater still has; uniform. Stands in for ages and diffusion."""
 
@@ -42,13 +43,14 @@ class CraterPopulation:
     """Craters placed at random with a power law of sizes, N(>D) = coefficient D^-exponent per square metre.
 
     Attributes:
-        coefficient: [m^(exponent - 2)] default 10^-1.1: equilibrium of small craters (Trask 1966, JPL TR 32-800).
+        coefficient: [m^(exponent - 2)] default 10^-1.1: equilibrium of small craters (Trask 1966, JPL TR
+            32-800).
         exponent: [-] default 2 (Trask 1966).
         minimum_diameter: [m] smaller craters are left out (they vanish in the rock field).
         maximum_diameter: [m] larger craters are left out.
         depth_law: depth (rim crest to floor) from diameter.
-        depth_ratio_range: [-] least and greatest depth over diameter under `DepthLaw.UNIFORM`. Small lunar craters
-            run from 0.06 (Wu et al. 2020) to Pike's 0.2.
+        depth_ratio_range: [-] least and greatest depth over diameter under `DepthLaw.UNIFORM`. Small lunar
+            craters run from 0.06 (Wu et al. 2020) to Pike's 0.2.
         ejecta_reach: [crater radii] distance from the centre at which the ejecta end.
 
     Raises:
@@ -139,7 +141,7 @@ def draw_craters(population: CraterPopulation, extent: float, rng: np.random.Gen
 
 
 @compile_kernel
-def _crater_elevation(  # noqa: PLR0913
+def _crater_elevation(
     distance: float, radius: float, floor_radius: float, depth: float, rim_height: float, reach: float
 ) -> float:
     """Elevation above the plain at `distance` from the centre: flat floor, parabolic wall, ejecta as x^-3."""
@@ -176,8 +178,9 @@ def _add_craters(
 def crater_relief(craters: Craters, size: int, pixel_size: float, ejecta_reach: float) -> NDArray[np.float32]:
     """Relief [m] of craters on a plain at zero, at the cell centres; overlapping craters add up.
 
-    Each has a flat floor of `floor_diameter` at rim_height - depth, a parabolic wall up to the rim crest and ejecta
-    that fall as (radius / distance)^3, less the constant that brings them to zero at `ejecta_reach` radii.
+    Each has a flat floor of `floor_diameter` at rim_height - depth, a parabolic wall up to the rim crest and
+    ejecta that fall as (radius / distance)^3, less the constant that brings them to zero at `ejecta_reach`
+    radii.
 
     Returns:
         (size, size) float32, [m], row north, column east.

@@ -13,8 +13,8 @@ class FieldSpectrum:
     """Amplitudes of the Fourier modes of a periodic field, in the layout of a real two-dimensional FFT.
 
     Attributes:
-        amplitude: (period, period // 2 + 1) float32; mode variance is four times its square, or once its square
-            in the two columns that stand for themselves alone (frequency zero and Nyquist).
+        amplitude: (period, period // 2 + 1) float32; mode variance is four times its square, or once its
+            square in the two columns that stand for themselves alone (frequency zero and Nyquist).
         period: [cells] side of the periodic square.
     """
 
@@ -54,7 +54,7 @@ def fast_period(cells: int) -> int:
     """Smallest even FFT length with small prime factors that holds `cells`."""
     from scipy.fft import next_fast_len
 
-    return 2 * next_fast_len((cells + 1) // 2, real=True)
+    return 2 * int(next_fast_len((cells + 1) // 2, real=True) or 0)
 
 
 def synthesise_field(spectrum: FieldSpectrum, size: int, rng: np.random.Generator) -> NDArray[np.float32]:
@@ -73,5 +73,6 @@ def synthesise_field(spectrum: FieldSpectrum, size: int, rng: np.random.Generato
     rows, columns = spectrum.amplitude.shape
     modes = rng.standard_normal((rows, 2 * columns), dtype=np.float32).view(np.complex64)
     modes *= spectrum.amplitude
-    field = irfft2(modes, s=(spectrum.period, spectrum.period), norm="forward", overwrite_x=True, workers=1)
+    shape = (spectrum.period, spectrum.period)
+    field = np.asarray(irfft2(modes, s=shape, norm="forward", overwrite_x=True, workers=1))
     return np.ascontiguousarray(field[:size, :size])

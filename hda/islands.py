@@ -17,12 +17,12 @@ from hda.gaussian_field import FieldSpectrum, fast_period, frequency_grid, make_
 class IslandField:
     """A smooth Gaussian field of mean zero and variance one; an island is where it lies below a threshold.
 
-    Rocks scattered evenly leave only pin-holes of safe ground. Islands stand for the patches that real sites have.
-    All three numbers are engineering choices, to be calibrated.
+    Rocks scattered evenly leave only pin-holes of safe ground. Islands stand for the patches that real sites
+    have. All three numbers are engineering choices, to be calibrated.
 
     Attributes:
-        smoothing_scale: [m] standard deviation of the Gaussian kernel that smooths white noise into the field, so its
-            correlation is exp(-distance^2 / (4 smoothing_scale^2)).
+        smoothing_scale: [m] standard deviation of the Gaussian kernel that smooths white noise into the
+            field, so its correlation is exp(-distance^2 / (4 smoothing_scale^2)).
         threshold: [standard deviations] islands cover a share Phi(threshold) of the ground.
         remaining_share: [-] share of the rocks that stay on islands.
 
@@ -53,5 +53,5 @@ def _spectrum(scale: float, size: int) -> FieldSpectrum:
 def generate_island_field(
     islands: IslandField, size: int, pixel_size: float, rng: np.random.Generator
 ) -> NDArray[np.float32]:
-    """Draw the field, (size, size) float32, row north, column east; below `islands.threshold` lies an island."""
+    """Draw the field, (size, size) float32, row north, column east; islands lie below the threshold."""
     return synthesise_field(_spectrum(islands.smoothing_scale / pixel_size, size), size, rng)

@@ -70,8 +70,8 @@ def raster_circle(radius: int) -> list[tuple[int, int]]:
 def make_footprint(footprint_diameter: float, pad_diameter: float, pixel_size: float) -> LanderFootprint:
     """Set a lander on a raster. Lengths in metres.
 
-    The outer radius is rounded up to whole cells from the edge of the centre's cell, the pad radius is half the
-    pad's cells, and the pad centres lie on a raster circle of the difference.
+    The outer radius is rounded up to whole cells from the edge of the centre's cell, the pad radius is half
+    the pad's cells, and the pad centres lie on a raster circle of the difference.
 
     Raises:
         ValueError: the lander is so small, or its pads so large, that the pads meet in its centre.
@@ -116,7 +116,8 @@ def _open_square(north: int, east: int) -> list[tuple[int, int, int]]:
     span = np.arange(-reach, reach + 1)
     rows, columns = span[:, None], span[None, :]
     inside = np.ones((span.size, span.size), dtype=bool)
-    # Inside means nearer than every side: the outward normal of the side after a corner is corner + next corner.
+    # Inside means nearer than every side: the outward normal of the side after a corner is corner + next
+    # corner.
     corners = _corners(north, east)
     for (n0, e0), (n1, e1) in zip(corners, corners[1:] + corners[:1], strict=True):
         normal_north, normal_east = n0 + n1, e0 + e1

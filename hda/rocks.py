@@ -1,4 +1,4 @@
-"""Rocks: an exponential law of covered area, drawn as hemi-ellipsoids, seen through the highest point of each cell."""
+"""Rocks: hemi-ellipsoids with an exponential law of covered area, seen by the highest point of a cell."""
 
 from __future__ import annotations
 
@@ -16,18 +16,20 @@ LEAST_AXIS_RATIO = 0.5  # [-] short over long axis of a rock, seen from above, i
 
 @dataclass(frozen=True)
 class RockPopulation:
-    """Rocks after Golombek and Rapp (1997): area share under rocks of diameter >= D is F = k exp(-q D), q = q0 + q1/k.
+    """Rocks of diameter D and more cover a share k exp(-q D) of the ground, q = q0 + q1 / k.
 
-    The defaults are the Martian fit at its dense end, which fills the ground with metre-sized blocks; real lunar
-    ground has far fewer. They make a hard task, they do not describe a site.
+    Golombek and Rapp (1997), with q as in Bernard and Golombek (2001).
+
+    The defaults are the Martian fit at its dense end, which fills the ground with metre-sized blocks; real
+    lunar ground has far fewer. They make a hard task, they do not describe a site.
 
     Attributes:
         area_fraction: [-] k, share of the ground covered by rocks of all sizes.
         decay_constant: [1/m] q0 (Bernard and Golombek 2001).
         decay_slope: [1/m] q1 (Bernard and Golombek 2001).
         minimum_diameter: [m] smaller rocks are left out.
-        maximum_diameter: [m] larger rocks are left out (extrapolated laws give too many blocks; Cintala and McBride
-            1995).
+        maximum_diameter: [m] larger rocks are left out (extrapolated laws give too many blocks; Cintala and
+            McBride 1995).
 
     Raises:
         ValueError: a field is out of range.
@@ -75,7 +77,10 @@ class RockPopulation:
 
 @dataclass(frozen=True)
 class Rocks:
-    """Rocks that were drawn: arrays of equal length; metres from the south-west corner, azimuth [rad] from east."""
+    """Rocks that were drawn, as arrays of equal length.
+
+    Metres from the south-west corner; the azimuth [rad] of the long axis counts from east to north.
+    """
 
     east: NDArray[np.float64]
     north: NDArray[np.float64]
@@ -100,9 +105,10 @@ def rock_margin(population: RockPopulation) -> float:
 
 
 def draw_rocks(population: RockPopulation, extent: float, rng: np.random.Generator) -> Rocks:
-    """Draw every rock that can touch a square tile of side `extent` [m]: a Poisson field, the same everywhere."""
+    """Draw every rock that can touch a square tile of side `extent` [m]: a uniform Poisson field."""
     margin = rock_margin(population)
-    # The law falls steeply, so its inverse is read from a table that is fine in log D (relative error below 1e-6).
+    # The law falls steeply, so its inverse is read from a table that is fine in log D (relative error below
+    # 1e-6).
     sizes = np.geomspace(population.minimum_diameter, population.maximum_diameter, 4097)
     above = population.density_above(sizes) - population.density_above(sizes[-1:])
     count = int(rng.poisson(max(above[0], 0.0) * (extent + 2.0 * margin) ** 2))
@@ -115,7 +121,7 @@ def draw_rocks(population: RockPopulation, extent: float, rng: np.random.Generat
 
 @compile_kernel
 def _least_form(a: float, b: float, c: float, west: float, south: float, side: float) -> float:
-    """Least value of a x^2 + 2 b x y + c y^2 over the square of `side` with its south-west corner at (west, south)."""
+    """Least a x^2 + 2 b x y + c y^2 over the square of `side` whose south-west corner is (west, south)."""
     east, north = west + side, south + side
     if west <= 0.0 <= east and south <= 0.0 <= north:
         return 0.0
@@ -159,8 +165,8 @@ def _raise_rocks(heights: NDArray[np.float32], table: NDArray[np.float64], pixel
 def rock_heights(rocks: Rocks, size: int, pixel_size: float) -> NDArray[np.float32]:
     """Greatest rock height [m] in each cell (the cell maximum, not the height at its centre).
 
-    A rock is half an ellipsoid, diameter / 2 high; its outline has the area of a circle of its diameter. Point
-    sampling would lose most rocks smaller than a cell. Where rocks overlap the highest counts.
+    A rock is half an ellipsoid, diameter / 2 high; its outline has the area of a circle of its diameter.
+    Point sampling would lose most rocks smaller than a cell. Where rocks overlap the highest counts.
 
     Returns:
         (size, size) float32, [m], zero where there is no rock, row north, column east.

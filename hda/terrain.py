@@ -70,12 +70,12 @@ def generate_terrain(parameters: TerrainParameters, rng: np.random.Generator) ->
 
     Args:
         parameters: what the ground is like.
-        rng: source of every draw; `terrain_rng(tile)` for a numbered tile. Spawning marks it, so a second call with
-            the same Generator gives another tile.
+        rng: source of every draw; `terrain_rng(tile)` for a numbered tile. Spawning marks it, so a second
+            call with the same Generator gives another tile.
 
     Returns:
-        (size, size) float32, [m]. Row grows north, column east; row 0 is the south edge; the centre of a cell lies at
-        ((column + 0.5) pixel_size, (row + 0.5) pixel_size).
+        (size, size) float32, [m]. Row grows north, column east; row 0 is the south edge; the centre of a cell
+        lies at ((column + 0.5) pixel_size, (row + 0.5) pixel_size).
     """
     base_rng, crater_rng, island_rng, rock_rng = rng.spawn(4)
     size, pixel_size = parameters.size, parameters.pixel_size

@@ -1,0 +1,108 @@
+"""The kernel of Algorithm 1: worst slope and roughness over a lander's orientations and stable planes.
+
+Row by row, a block of columns at a time, so that the inner loops run over neighbouring sites and vectorise.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numba
+import numpy as np
+
+from guidance.kernel import compile_kernel, compile_parallel_kernel
+
+COLUMN_BLOCK = 256  # sites of a row worked on together; their buffers stay in the first-level cache
+
+
+@compile_kernel
+def _plane_gradients(pad_map, row, start, n, north, east, buffer):
+    """Gradients [m per cell] of the two stable planes and the centre's height, for `n` sites of a row."""
+    z0 = pad_map[row + north, start + east : start + east + n]
+    z1 = pad_map[row + east, start - north : start - north + n]
+    z2 = pad_map[row - north, start - east : start - east + n]
+    z3 = pad_map[row - east, start + north : start + north + n]
+    east_a, north_a, east_b, north_b, centre = buffer[0], buffer[1], buffer[2], buffer[3], buffer[4]
+    squared_radius = float(north * north + east * east)
+    for i in range(n):
+        first, second = 0.5 * (z0[i] + z2[i]), 0.5 * (z1[i] + z3[i])
+        first_rules = first >= second
+        # Half height differences between opposite pads, along pads 2 to 0 and along pads 3 to 1.
+        along_a = 0.5 * (z0[i] - z2[i]) if first_rules else z0[i] - second
+        along_b = 0.5 * (z0[i] - z2[i]) if first_rules else second - z2[i]
+        across_a = z1[i] - first if first_rules else 0.5 * (z1[i] - z3[i])
+        across_b = first - z3[i] if first_rules else 0.5 * (z1[i] - z3[i])
+        centre[i] = first if first_rules else second
+        east_a[i] = (along_a * east - across_a * north) / squared_radius
+        north_a[i] = (along_a * north + across_a * east) / squared_radius
+        east_b[i] = (along_b * east - across_b * north) / squared_radius
+        north_b[i] = (along_b * north + across_b * east) / squared_radius
+
+
+@compile_kernel
+def _highest_ground(elevation, row, start, n, strips, buffer):
+    """Greatest elevation less gradient times offset over the cells between the pads, for both planes."""
+    east_a, north_a, east_b, north_b = buffer[0], buffer[1], buffer[2], buffer[3]
+    high_a, high_b, strip_a, strip_b = buffer[5], buffer[6], buffer[7], buffer[8]
+    for i in range(n):
+        high_a[i], high_b[i] = -np.inf, -np.inf
+    for k in range(strips.shape[0]):
+        north = strips[k, 0]
+        for i in range(n):
+            strip_a[i], strip_b[i] = -np.inf, -np.inf
+        for east in range(strips[k, 1], strips[k, 2] + 1):
+            z = elevation[row + north, start + east : start + east + n]
+            for i in range(n):
+                a, b = z[i] - east * east_a[i], z[i] - east * east_b[i]
+                strip_a[i] = a if a > strip_a[i] else strip_a[i]
+                strip_b[i] = b if b > strip_b[i] else strip_b[i]
+        for i in range(n):
+            a, b = strip_a[i] - north * north_a[i], strip_b[i] - north * north_b[i]
+            high_a[i] = a if a > high_a[i] else high_a[i]
+            high_b[i] = b if b > high_b[i] else high_b[i]
+
+
+@compile_parallel_kernel
+def assess_rows(elevation, pad_map, footprint, scales, worst):
+    """Fill the three maps of `worst`, row by row: cells do not depend on one another.
+
+    For an orientation, with pads 0 to 3 at opposite corners 0-2 and 1-3 and R pads' distance from the centre,
+    the plane through the higher diagonal has along it the gradient (z0 - z2) / 2R and across it (z1 - h) / R
+    or (h - z3) / R, where h is the height of the lander's centre, the mean of the diagonal's pads.
+    """
+    pads, first_strip, strips, reach = footprint
+    pixel_size, max_roughness = scales
+    slope, roughness, excess = worst
+    rows, columns = elevation.shape
+    for row in numba.prange(reach, rows - reach):
+        buffer = np.empty((9, COLUMN_BLOCK))
+        for start in range(reach, columns - reach, COLUMN_BLOCK):
+            n = min(COLUMN_BLOCK, columns - reach - start)
+            steepest, roughest, most = slope[row, start:], roughness[row, start:], excess[row, start:]
+            for i in range(n):
+                steepest[i], roughest[i], most[i] = 0.0, -np.inf, -np.inf
+            for k in range(pads.shape[0]):
+                _plane_gradients(pad_map, row, start, n, pads[k, 0], pads[k, 1], buffer)
+                _highest_ground(elevation, row, start, n, strips[first_strip[k] : first_strip[k + 1]], buffer)
+                east_a, north_a, east_b, north_b, centre = (
+                    buffer[0],
+                    buffer[1],
+                    buffer[2],
+                    buffer[3],
+                    buffer[4],
+                )
+                high_a, high_b = buffer[5], buffer[6]
+                for i in range(n):
+                    squared_a = (east_a[i] ** 2 + north_a[i] ** 2) / pixel_size**2
+                    squared_b = (east_b[i] ** 2 + north_b[i] ** 2) / pixel_size**2
+                    secant_a, secant_b = math.sqrt(1.0 + squared_a), math.sqrt(1.0 + squared_b)
+                    above_a, above_b = high_a[i] - centre[i], high_b[i] - centre[i]
+                    steepest[i] = max(steepest[i], max(squared_a, squared_b))
+                    roughest[i] = max(roughest[i], max(above_a / secant_a, above_b / secant_b))
+                    margin_a, margin_b = (
+                        above_a - max_roughness * secant_a,
+                        above_b - max_roughness * secant_b,
+                    )
+                    most[i] = max(most[i], max(margin_a, margin_b))
+            for i in range(n):
+                steepest[i] = math.atan(math.sqrt(steepest[i]))
