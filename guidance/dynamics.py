@@ -27,7 +27,7 @@ _SERIES_BELOW = 0.02  # burnt mass fraction under which the power series is more
 @compile_kernel
 def velocity_factor(burnt: float) -> float:
     """-ln(1 - x)/x: gain of velocity over that at constant mass; x = burnt fraction of the initial mass."""
-    if burnt < 1e-12:
+    if burnt == 0.0:
         return 1.0
     return -math.log1p(-burnt) / burnt
 
