@@ -68,3 +68,17 @@ def generate_base_surface(
         (size, size) float32, [m], row north, column east.
     """
     return synthesise_field(_spectrum(surface, size, pixel_size), size, rng)
+
+
+def rms_slope(dem: NDArray[np.floating], pixel_size: float = 1.0, cells: int = 1) -> float:
+    """RMS slope [rad] of a map over a step of `cells` cells: along rows and columns, their mean square.
+
+    Args:
+        dem: (m, n) elevation [m].
+        pixel_size: [m] side of a cell.
+        cells: the baseline, in cells.
+    """
+    heights = np.asarray(dem, dtype=np.float64)
+    east = np.mean((heights[:, cells:] - heights[:, :-cells]) ** 2)
+    north = np.mean((heights[cells:] - heights[:-cells]) ** 2)
+    return math.atan(math.sqrt(0.5 * (east + north)) / (cells * pixel_size))

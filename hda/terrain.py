@@ -101,3 +101,11 @@ def _generate_rocks(
     column = np.floor(rocks.east / pixel_size).astype(np.intp) + margin
     rocks = rocks.keep((abundance[row, column] > islands.threshold) | spared)
     return rock_heights(rocks, parameters.size, pixel_size)
+
+
+if __name__ == "__main__":
+    import tyro
+
+    from hda.terrain_picture import show_terrain
+
+    tyro.cli(show_terrain)
