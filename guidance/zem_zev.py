@@ -124,16 +124,19 @@ def zem_zev_into(
 @compile_kernel
 def saturate_into(thrust: NDArray[np.float64], min_thrust: float, max_thrust: float) -> None:
     """Bring |thrust| into [min_thrust, max_thrust] in place, direction kept; a zero vector points up."""
-    magnitude = math.sqrt(thrust[0] ** 2 + thrust[1] ** 2 + thrust[2] ** 2)
+    largest = max(abs(thrust[0]), abs(thrust[1]), abs(thrust[2]))
+    if largest == 0.0:
+        thrust[2] = min_thrust
+        return
+    # relative to the largest component nothing overflows, however large the command
+    relative = math.sqrt((thrust[0] / largest) ** 2 + (thrust[1] / largest) ** 2 + (thrust[2] / largest) ** 2)
+    magnitude = largest * relative
     if magnitude > max_thrust:
         for axis in range(3):
-            thrust[axis] *= max_thrust / magnitude
+            thrust[axis] = thrust[axis] / largest * (max_thrust / relative)
     elif magnitude < min_thrust:
-        if magnitude == 0.0:
-            thrust[2] = min_thrust
-        else:
-            for axis in range(3):
-                thrust[axis] *= min_thrust / magnitude
+        for axis in range(3):
+            thrust[axis] = thrust[axis] / largest * (min_thrust / relative)
 
 
 def quartic_fourth_power(gravity: NDArray[np.float64], time_weight: float | None) -> float:
@@ -205,11 +208,12 @@ def zem_zev_acceleration(
     Raises:
         ValueError: an argument is not finite or of the wrong shape, or the time to go is not positive.
     """
+    position_gain, velocity_gain = finite_vector("gains", gains, 2)
     out = np.empty(3)
     zem_zev_into(
         state.as_array(),
         finite_vector("target", target, 3),
-        (float(gains[0]), float(gains[1])),
+        (float(position_gain), float(velocity_gain)),
         finite_number("time_to_go", time_to_go, above=0.0),
         finite_vector("gravity", gravity, 3),
         out,
