@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from scipy.optimize import bisect, minimize_scalar
+from scipy.optimize import minimize_scalar, root_scalar
 
 from guidance import MOON_GRAVITY, PAPER_LANDER, State, propagate, time_to_go, zem_zev_acceleration
 
@@ -139,8 +139,8 @@ def test_from_rest(miss, time_weight):
 @TIME_WEIGHTS
 @given(velocity=vectors(50.0))
 def test_at_the_target_with_velocity(velocity, time_weight):
-    """Without a miss c t^2 = 2 v^2; a position that nears the target takes the same time or lands at once."""
-    assume(np.linalg.norm(velocity) > 1e-3)
+    """Without a miss c t^2 = 2 v^2; the same holds in the limit of a vanishing one, behind the vehicle."""
+    assume(np.linalg.norm(velocity) > 0.1)
     fourth = GRAVITY @ GRAVITY * (1.0 if time_weight is None else 0.5)
     found = time_to_go(state_at(ORIGIN, velocity), ORIGIN, time_weight=time_weight)
     assert found == pytest.approx(math.sqrt(2.0 * velocity @ velocity / fourth), rel=1e-13)
@@ -229,7 +229,7 @@ def test_stationary_points_of_the_cost_are_the_roots(miss, velocity, count, time
     grid = np.geomspace(0.5, 500.0, 4000)
     slopes = np.array([slope(float(time)) for time in grid])
     turns = np.nonzero(np.signbit(slopes[:-1]) != np.signbit(slopes[1:]))[0]
-    stationary = [bisect(slope, grid[k], grid[k + 1]) for k in turns]
+    stationary = [root_scalar(slope, bracket=(grid[k], grid[k + 1])).root for k in turns]
     assert len(stationary) == count
     roots, _ = real_roots(miss, velocity, time_weight=time_weight)
     np.testing.assert_allclose(stationary, roots, rtol=1e-5)
