@@ -34,7 +34,7 @@ def state_at(miss, velocity, mass: float = 1200.0) -> State:
 
 def printed_terms(time, miss, velocity, end_velocity, gravity=GRAVITY, time_weight: float | None = PAPER):
     """The paper's polynomial, term by term; it prints |g|^2 t^4, which is W = |g|^2/2."""
-    weight = 0.5 * gravity @ gravity if time_weight is None else time_weight
+    weight = 0.5 * float(gravity @ gravity) if time_weight is None else time_weight
     squares = velocity @ velocity + end_velocity @ velocity + end_velocity @ end_velocity
     return np.array(
         [
@@ -70,7 +70,7 @@ def energy(time: float, state: State, end_velocity=ORIGIN, gravity=GRAVITY) -> f
 
 
 def cost(time: float, state: State, time_weight: float | None, end_velocity=ORIGIN, gravity=GRAVITY) -> float:
-    weight = 0.5 * gravity @ gravity if time_weight is None else time_weight
+    weight = 0.5 * float(gravity @ gravity) if time_weight is None else time_weight
     return energy(time, state, end_velocity, gravity) + weight * time
 
 
