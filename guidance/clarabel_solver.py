@@ -1,0 +1,149 @@
+"""One safe door to Clarabel: what its Python interface does not check is checked here.
+
+Clarabel reads a square CSR matrix as its transpose, panics (a BaseException) on some others, prints and ignores
+unknown keys of `update`, and ends in NumericalError on infinite data.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from scipy.sparse import csc_matrix
+
+
+class SolveStatus(Enum):
+    """How a conic solve ended."""
+
+    SOLVED = "solved"
+    INFEASIBLE = "infeasible"
+    UNBOUNDED = "unbounded"
+    LIMIT_REACHED = "limit reached"
+    FAILED = "failed"
+
+
+_STATUSES = {
+    "Solved": SolveStatus.SOLVED,
+    "AlmostSolved": SolveStatus.LIMIT_REACHED,
+    "PrimalInfeasible": SolveStatus.INFEASIBLE,
+    "AlmostPrimalInfeasible": SolveStatus.LIMIT_REACHED,
+    "DualInfeasible": SolveStatus.UNBOUNDED,
+    "MaxIterations": SolveStatus.LIMIT_REACHED,
+    "MaxTime": SolveStatus.LIMIT_REACHED,
+}
+
+
+@dataclass(frozen=True, eq=False)
+class ConicAnswer:
+    """Answer to: minimise q'x subject to A x + s = b, s in the cones.
+
+    Attributes:
+        status: how the solve ended; `primal` means something only if SOLVED.
+        primal: x, shape (n,).
+        dual: shape (m,); the Farkas certificate if INFEASIBLE.
+        iterations: interior-point iterations.
+        words: the solver's own name of the ending.
+    """
+
+    status: SolveStatus
+    primal: NDArray[np.float64]
+    dual: NDArray[np.float64]
+    iterations: int
+    words: str
+
+
+def cone_list(cones: tuple[tuple[str, int], ...]) -> list[Any]:
+    """Clarabel cone objects for ('zero' | 'nonnegative' | 'second_order', size) pairs."""
+    import clarabel
+
+    makers = {
+        "zero": clarabel.ZeroConeT,
+        "nonnegative": clarabel.NonnegativeConeT,
+        "second_order": clarabel.SecondOrderConeT,
+    }
+    return [makers[kind](size) for kind, size in cones]
+
+
+class ConicSolver:
+    """A Clarabel solver of fixed sparsity; every solve replaces all numbers, so none depends on an earlier one."""
+
+    def __init__(
+        self,
+        matrix: csc_matrix,
+        bound: NDArray[np.float64],
+        cost: NDArray[np.float64],
+        cones: tuple[tuple[str, int], ...],
+        tolerance: float = 1e-8,
+    ) -> None:
+        """Assemble from nominal numbers, and solve them once: a solver's first solve differs in its last bits.
+
+        Args:
+            matrix: A, CSC, shape (m, n); every entry that may ever be nonzero is stored.
+            bound: b, shape (m,).
+            cost: q, shape (n,).
+            cones: (kind, size) in row order.
+            tolerance: gap and feasibility tolerance.
+
+        Raises:
+            ValueError: the data do not fit together or are not finite.
+        """
+        import clarabel
+        from scipy.sparse import csc_matrix
+
+        if matrix.format != "csc":
+            raise ValueError(f"matrix must be CSC, got {matrix.format}")
+        if not matrix.has_sorted_indices:
+            raise ValueError("matrix must have sorted indices")
+        if matrix.shape != (bound.size, cost.size) or sum(size for _, size in cones) != bound.size:
+            raise ValueError("matrix, bound, cost and cones do not fit together")
+        self._shape = (matrix.nnz, bound.size, cost.size)
+        self._check(matrix.data, bound, cost)
+        settings = clarabel.DefaultSettings()
+        settings.verbose = False
+        settings.presolve_enable = False  # removed rows would forbid updates
+        settings.input_sparse_dropzeros = False
+        settings.max_threads = 1
+        settings.direct_solve_method = "qdldl"
+        settings.max_iter = 100
+        for name in ("tol_gap_abs", "tol_gap_rel", "tol_feas"):
+            setattr(settings, name, tolerance)
+        quadratic = csc_matrix((cost.size, cost.size))
+        self._solver = clarabel.DefaultSolver(quadratic, cost, matrix, bound, cone_list(cones), settings)
+        self._solver.solve()
+
+    def _check(self, *arrays: NDArray[np.float64]) -> None:
+        for array, size in zip(arrays, self._shape, strict=True):
+            if array.shape != (size,) or not np.isfinite(array).all():
+                raise ValueError("conic data must be finite and of the assembled shape")
+
+    def solve(
+        self, values: NDArray[np.float64], bound: NDArray[np.float64], cost: NDArray[np.float64]
+    ) -> ConicAnswer:
+        """Solve with new numbers: the stored entries of A in CSC order, b and q. Raises nothing of the solver's.
+
+        Raises:
+            ValueError: a number is not finite, or a shape is not the assembled one.
+        """
+        self._check(values, bound, cost)
+        try:
+            self._solver.update(A=values, b=bound, q=cost)
+            solution = self._solver.solve()
+            words = str(solution.status)
+            primal = np.array(solution.x)
+            dual = np.array(solution.z)
+            status = _STATUSES.get(words, SolveStatus.FAILED)
+            if status in (SolveStatus.SOLVED, SolveStatus.INFEASIBLE):
+                answer = primal if status is SolveStatus.SOLVED else dual
+                if not np.isfinite(answer).all():
+                    status = SolveStatus.FAILED
+            return ConicAnswer(status, primal, dual, int(solution.iterations), words)
+        except (KeyboardInterrupt, SystemExit):
+            raise
+        except BaseException as error:  # pyo3's PanicException is not an Exception
+            empty = np.full(self._shape[2], np.nan), np.full(self._shape[1], np.nan)
+            return ConicAnswer(SolveStatus.FAILED, *empty, 0, f"{type(error).__name__}: {error}")

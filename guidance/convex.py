@@ -1,0 +1,241 @@
+"""Least propellant (or least landing error) at a fixed time of flight, as a second-order cone programme.
+
+Assembled straight into Clarabel. One solver is built per (nodes, constraint set) from fixed nominal numbers and
+kept for the process; every solve replaces all numbers, so an answer has the same bits whatever was solved before.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from guidance import constraints
+from guidance.clarabel_solver import ConicAnswer, ConicSolver, SolveStatus
+from guidance.constraints import Rows
+from guidance.layout import Layout
+from guidance.problem import LandingProblem
+from guidance.scaling import ScaledProblem, scale_problem
+from guidance.state import State
+
+Array = NDArray[np.float64]
+Family = Callable[[Layout, ScaledProblem], Rows]
+
+
+@dataclass(frozen=True)
+class ConstraintSet:
+    """What decides the sparsity of the problem.
+
+    Attributes:
+        nodes: N.
+        min_thrust: whether the engine has a lower bound.
+        pointing: whether the thrust direction is limited.
+        glide_slope: whether there is a glide slope limit below the horizon.
+        speed_limit: whether the speed is limited.
+        free_landing_point: whether the landing point may move in the target's plane.
+    """
+
+    nodes: int
+    min_thrust: bool = False
+    pointing: bool = False
+    glide_slope: bool = False
+    speed_limit: bool = False
+    free_landing_point: bool = False
+
+    @classmethod
+    def of(cls, problem: LandingProblem, nodes: int, free_landing_point: bool = False) -> ConstraintSet:
+        """The constraint set that `problem` needs."""
+        pointing, glide = problem.lander.pointing_limit, problem.glide_slope_limit
+        return cls(
+            nodes,
+            problem.lander.min_thrust > 0.0,
+            pointing is not None and pointing < np.pi,
+            glide is not None and glide < np.pi / 2 - 1e-6,
+            problem.speed_limit is not None,
+            free_landing_point,
+        )
+
+    @property
+    def families(self) -> list[Family]:
+        """Constraint functions in row order."""
+        chosen: list[tuple[bool, Family]] = [
+            (True, constraints.start),
+            (True, constraints.motion),
+            (True, constraints.landing),
+            (True, constraints.max_thrust),
+            (self.min_thrust, constraints.min_thrust),
+            (True, constraints.altitude_floor),
+            (self.pointing, constraints.pointing),
+            (True, constraints.dry_mass),
+            (self.free_landing_point, constraints.landing_error_limit),
+            (True, constraints.thrust_cone),
+            (self.glide_slope, constraints.glide_slope),
+            (self.speed_limit, constraints.speed_limit),
+            (self.free_landing_point, constraints.landing_error),
+        ]
+        return [family for wanted, family in chosen if wanted]
+
+
+@dataclass(frozen=True, eq=False)
+class ConvexSolution:
+    """Answer of one fixed-time solve.
+
+    Attributes:
+        answer: the conic solver's answer, in scaled units.
+        layout: indices into it.
+        scaled: the numbers it was solved with.
+        rows: the constraint rows it was solved with.
+        value: what was minimised: ln(start mass / final mass), or the landing error [m].
+        slope: derivative of `value` with respect to the time of flight, from the dual solution.
+    """
+
+    answer: ConicAnswer
+    layout: Layout
+    scaled: ScaledProblem
+    rows: list[Rows]
+    value: float
+    slope: float
+
+    @property
+    def solved(self) -> bool:
+        """Whether there is an optimum."""
+        return self.answer.status is SolveStatus.SOLVED
+
+    @property
+    def time(self) -> float:
+        """[s] time of flight."""
+        return self.scaled.time
+
+    @cached_property
+    def log_mass(self) -> Array:
+        """ln(m / m_start) at the nodes, shape (N,)."""
+        return self.scaled.kappa * self.answer.primal[self.layout.log_mass]
+
+    @property
+    def propellant_share(self) -> float:
+        """ln(start mass / final mass)."""
+        return -float(self.log_mass[-1])
+
+    @property
+    def landing_error(self) -> float:
+        """[m] distance between landing point and target, in the target's plane."""
+        return float(np.linalg.norm(self.answer.primal[self.layout.position[-1, :2]])) * self.scaled.length
+
+
+class ConvexTemplate:
+    """The assembled problem of one ConstraintSet."""
+
+    def __init__(self, constraint_set: ConstraintSet, tolerance: float = 1e-8) -> None:
+        """Fix sparsity and scaling from nominal numbers that no caller can change."""
+        from scipy.sparse import csc_matrix
+
+        self.layout = Layout(constraint_set.nodes, constraint_set.free_landing_point)
+        self._families = constraint_set.families
+        self._constant: dict[Family, Rows] = {}
+        nominal = _nominal_numbers(constraint_set.nodes)
+        rows = self._rows(nominal)
+        for family in (constraints.landing, constraints.altitude_floor, constraints.thrust_cone):
+            self._constant[family] = family(self.layout, nominal)
+        first = np.cumsum([0] + [part.bound.size for part in rows])
+        self._row = np.concatenate([part.row + offset for part, offset in zip(rows, first, strict=False)])
+        self._column = np.concatenate([part.column for part in rows])
+        self._order = np.lexsort((self._row, self._column))
+        counts = np.bincount(self._column, minlength=self.layout.size)
+        pointer = np.concatenate([[0], np.cumsum(counts)])
+        values, bound = self._numbers(rows)
+        shape = (int(first[-1]), self.layout.size)
+        matrix = csc_matrix((values[self._order], self._row[self._order], pointer), shape=shape)
+        self.cones = _cones(rows)
+        self._solver = ConicSolver(matrix, bound, self.cost(False), self.cones, tolerance)
+
+    def _rows(self, scaled: ScaledProblem) -> list[Rows]:
+        return [self._constant.get(family) or family(self.layout, scaled) for family in self._families]
+
+    @staticmethod
+    def _numbers(rows: list[Rows]) -> tuple[Array, Array]:
+        return np.concatenate([part.value for part in rows]), np.concatenate([part.bound for part in rows])
+
+    def cost(self, least_error: bool) -> Array:
+        """Cost vector: the landing error, or the negative final log-mass."""
+        cost = np.zeros(self.layout.size)
+        if least_error:
+            cost[self.layout.landing_error] = 1.0
+        else:
+            cost[self.layout.log_mass[-1]] = -1.0
+        return cost
+
+    def solve(self, scaled: ScaledProblem, least_error: bool = False) -> ConvexSolution:
+        """Solve with new numbers."""
+        rows = self._rows(scaled)
+        values, bound = self._numbers(rows)
+        cost = self.cost(least_error)
+        answer = self._solver.solve(values[self._order], bound, cost)
+        if answer.status is not SolveStatus.SOLVED:
+            return ConvexSolution(answer, self.layout, scaled, rows, np.nan, np.nan)
+        unit, power = (scaled.length, 2) if least_error else (scaled.kappa, 1)
+        value = float(cost @ answer.primal)
+        sensitivity = self._sensitivity(rows, answer)
+        slope = unit * (power * value + sensitivity) / scaled.time
+        return ConvexSolution(answer, self.layout, scaled, rows, unit * value, slope)
+
+    def _sensitivity(self, rows: list[Rows], answer: ConicAnswer) -> float:
+        """T d(optimum)/dT at fixed units: dual' (T dA/dT x - T db/dT), each number being a power of T."""
+        total, first = 0.0, 0
+        for part in rows:
+            dual = answer.dual[first : first + part.bound.size]
+            first += part.bound.size
+            if part.value_power.any():
+                weight = part.value_power * part.value * answer.primal[part.column]
+                total += float(dual[part.row] @ weight)
+            if part.bound_power.any():
+                total -= float(dual @ (part.bound_power * part.bound))
+        return total
+
+
+def _cones(rows: list[Rows]) -> tuple[tuple[str, int], ...]:
+    cones: list[tuple[str, int]] = []
+    for part in rows:
+        if part.cone == "second_order":
+            cones += [(part.cone, part.cone_size)] * (part.bound.size // part.cone_size)
+        else:
+            cones.append((part.cone, part.bound.size))
+    return tuple(cones)
+
+
+def _nominal_numbers(nodes: int) -> ScaledProblem:
+    """Numbers of the size that a descent has; only the solver's internal scaling depends on them."""
+    from guidance.constants import MOON_GRAVITY
+    from guidance.lander import Lander
+
+    problem = LandingProblem(
+        State(np.array([200.0, 100.0, 900.0]), np.array([-8.0, -4.0, -30.0]), 1200.0),
+        np.zeros(3),
+        Lander(min_thrust=1000.0, pointing_limit=1.0),
+        np.array(MOON_GRAVITY),
+        glide_slope_limit=1.0,
+        speed_limit=100.0,
+    )
+    return scale_problem(problem, 30.0, nodes)
+
+
+class _TemplateCache(threading.local):
+    """Templates of one thread: a solver object must not be shared while it solves."""
+
+    def __init__(self) -> None:
+        self.templates: dict[tuple[ConstraintSet, float], ConvexTemplate] = {}
+
+
+_CACHE = _TemplateCache()
+
+
+def convex_template(constraint_set: ConstraintSet, tolerance: float = 1e-8) -> ConvexTemplate:
+    """The assembled problem for a constraint set: built once per thread, then kept."""
+    key = (constraint_set, tolerance)
+    template = _CACHE.templates.get(key)
+    if template is None:
+        template = _CACHE.templates[key] = ConvexTemplate(constraint_set, tolerance)
+    return template

@@ -1,0 +1,146 @@
+"""Convex planning: one fixed-time task refined until the true thrust bounds hold, and the best time of flight."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from guidance.convex import ConstraintSet, ConvexSolution, convex_template
+from guidance.flight_time import TimeModel, TimeSearch
+from guidance.problem import LandingProblem
+from guidance.scaling import scale_problem
+from guidance.time_window import TimeWindow, guess_time, time_window
+
+Array = NDArray[np.float64]
+
+_THRUST_TOLERANCE = 5e-4  # relative; half of what a plan promises
+_COARSE_NODES = 16
+_MOST_REFINEMENTS = 8
+SHARE_TOLERANCE = 2e-6
+"""Gain in ln(mass) below which the time search stops: 2.4 g of propellant at 1200 kg."""
+
+
+@dataclass(frozen=True, eq=False)
+class ConvexTask:
+    """What is minimised, under which limits, on how many nodes; only the time of flight is left open.
+
+    Attributes:
+        problem: the landing problem.
+        nodes: N.
+        free_landing_point: whether the landing point may move in the target's plane.
+        least_error: whether to minimise the landing error in place of the propellant.
+        error_limit: [m] greatest landing error; None for none.
+        limit_propellant: whether the dry mass bounds the flight (see `guidance.scaling.scale_problem`).
+        tolerance: of the conic solver.
+    """
+
+    problem: LandingProblem
+    nodes: int
+    free_landing_point: bool = False
+    least_error: bool = False
+    error_limit: float | None = None
+    limit_propellant: bool = False
+    tolerance: float = 1e-8
+
+    def solve(self, time: float, log_mass: Array | None = None) -> ConvexSolution:
+        """One conic solve; thrust bounds linearised at `log_mass` (any length), or relaxed outward if None."""
+        if log_mass is not None and log_mass.size != self.nodes:
+            shares = np.linspace(0.0, 1.0, log_mass.size)
+            log_mass = np.interp(np.linspace(0.0, 1.0, self.nodes), shares, log_mass)
+        chosen = ConstraintSet.of(self.problem, self.nodes, self.free_landing_point)
+        scaled = scale_problem(
+            self.problem, time, self.nodes, log_mass, self.error_limit, self.limit_propellant
+        )
+        return convex_template(chosen, self.tolerance).solve(scaled, self.least_error)
+
+    def refine(self, solution: ConvexSolution, reference: Array | None = None) -> ConvexSolution:
+        """Linearise anew until the true thrust bounds hold; unsolved if they cannot be met.
+
+        Args:
+            solution: a solved answer of this task.
+            reference: the log-mass it was linearised at; None if it was relaxed outward.
+        """
+        for _ in range(_MOST_REFINEMENTS):
+            if bounds_hold(self.problem, solution, reference):
+                break
+            reference = solution.log_mass
+            solution = self.solve(solution.time, reference)
+            if not solution.solved:
+                break
+        return solution
+
+
+def bounds_hold(problem: LandingProblem, solution: ConvexSolution, reference: Array | None) -> bool:
+    """Whether the true bounds on mass times acceleration hold, and no thrust is given away, to 0.05 %."""
+    log_mass = solution.log_mass
+    thrust = solution.answer.primal[solution.layout.slack] * np.exp(log_mass)  # share of the full thrust
+    ratio = problem.lander.min_thrust / problem.lander.max_thrust
+    if thrust.max() > 1.0 + _THRUST_TOLERANCE or thrust.min() < ratio * (1.0 - _THRUST_TOLERANCE):
+        return False
+    if reference is None:
+        return True
+    if reference.size != log_mass.size:
+        return False
+    return 0.5 * float(np.max((log_mass - reference) ** 2)) < _THRUST_TOLERANCE
+
+
+@dataclass(frozen=True, eq=False)
+class TimeOutcome:
+    """What a search over the time of flight found.
+
+    Attributes:
+        solution: the cheapest flight; None if no time tried was feasible.
+        window: the closed-form bounds that were searched.
+        tried: every fixed-time solution on the task's own nodes.
+    """
+
+    solution: ConvexSolution | None
+    window: TimeWindow
+    tried: list[ConvexSolution]
+
+
+def _asymptote(task: ConvexTask) -> float:
+    """Slope of the cost at long times: the price of hovering; unknown for a landing error."""
+    if task.least_error:
+        return 0.0
+    return float(np.linalg.norm(task.problem.gravity)) / task.problem.lander.exhaust_velocity
+
+
+def minimise_over_time(
+    task: ConvexTask, tolerance: float = SHARE_TOLERANCE, guess: float | None = None
+) -> TimeOutcome:
+    """Search the time of flight of least cost.
+
+    Without a guess the time, the thrust bounds' linearisation and the curvature of the cost come from a search on
+    a coarse mesh, so that one or two solves are left for the fine one.
+
+    Args:
+        task: what is solved at each time.
+        tolerance: gain below which the search stops, in units of the task's cost.
+        guess: [s] time to start from; None to start from the coarse mesh.
+    """
+    window = time_window(task.problem, task.free_landing_point)
+    if window.empty:
+        return TimeOutcome(None, window, [])
+    model = TimeModel(_asymptote(task))
+    reference: Array | None = None
+    start = guess_time(task.problem, window) if guess is None else guess
+    if guess is None and task.nodes > 1.5 * _COARSE_NODES:
+        coarse = replace(task, nodes=_COARSE_NODES, tolerance=1e-6)
+        search = TimeSearch(coarse.solve, window, 2.0 * tolerance, model)
+        found = search.run(start)
+        if found is not None:
+            start, model = found.time, search.model
+            if not bounds_hold(task.problem, found, None):
+                refined = coarse.refine(found)
+                reference = refined.log_mass if refined.solved else None
+    start = min(max(start, window.low), window.high)
+
+    def evaluate(time: float) -> ConvexSolution:
+        solution = task.solve(time, reference)
+        return solution if solution.solved or reference is None else task.solve(time)
+
+    search = TimeSearch(evaluate, window, tolerance, model)
+    return TimeOutcome(search.run(start), window, search.samples)
