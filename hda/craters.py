@@ -17,6 +17,7 @@ from guidance.kernel import compile_kernel
 from guidance.validation import finite_number
 
 KILOMETRE = 1000.0
+LARGEST_SIMPLE_CRATER = 15.0 * KILOMETRE  # [m] beyond, craters are complex and Pike's relations others
 
 STOPAR_DIAMETER = np.array([10.0, 40.0, 100.0, 200.0, 400.0])
 """[m] lower edges of the size classes of `STOPAR_DEPTH_RATIO`, which has one more class below 10 m."""
@@ -47,7 +48,7 @@ class CraterPopulation:
             32-800).
         exponent: [-] default 2 (Trask 1966).
         minimum_diameter: [m] smaller craters are left out (they vanish in the rock field).
-        maximum_diameter: [m] larger craters are left out.
+        maximum_diameter: [m] larger craters are left out; at most 15 km, where craters become complex.
         depth_law: depth (rim crest to floor) from diameter.
         depth_ratio_range: [-] least and greatest depth over diameter under `DepthLaw.UNIFORM`. Small lunar
             craters run from 0.06 (Wu et al. 2020) to Pike's 0.2.
@@ -70,7 +71,12 @@ class CraterPopulation:
         finite_number("coefficient", self.coefficient, at_least=0.0)
         finite_number("exponent", self.exponent, above=0.0)
         finite_number("minimum_diameter", self.minimum_diameter, above=0.0)
-        finite_number("maximum_diameter", self.maximum_diameter, above=self.minimum_diameter)
+        finite_number(
+            "maximum_diameter",
+            self.maximum_diameter,
+            above=self.minimum_diameter,
+            at_most=LARGEST_SIMPLE_CRATER,
+        )
         low, high = self.depth_ratio_range
         finite_number("depth_ratio_range[0]", low, at_least=0.0)
         finite_number("depth_ratio_range[1]", high, at_least=low, at_most=0.5)

@@ -23,19 +23,20 @@ class FieldSpectrum:
 
     def variance_per_column(self) -> NDArray[np.float64]:
         """Variance carried by each east-west frequency, shape (period // 2 + 1,)."""
-        return (self.amplitude.astype(np.float64) ** 2).sum(axis=0) * _mode_weight(self.period)
+        return (self.amplitude.astype(np.float64) ** 2).sum(axis=0) * _multiplicity(self.period) ** 2
 
     def scaled(self, factor: float) -> FieldSpectrum:
         """The spectrum of the same field times `factor`."""
         return FieldSpectrum((self.amplitude * factor).astype(np.float32), self.period)
 
 
-def _mode_weight(period: int) -> NDArray[np.float64]:
-    weight = np.full(period // 2 + 1, 4.0)
-    weight[0] = 1.0
+def _multiplicity(period: int) -> NDArray[np.float64]:
+    """How many columns of the full transform each column of the real one stands for."""
+    count = np.full(period // 2 + 1, 2.0)
+    count[0] = 1.0
     if period % 2 == 0:
-        weight[-1] = 1.0
-    return weight
+        count[-1] = 1.0
+    return count
 
 
 def frequency_grid(period: int) -> NDArray[np.float64]:
@@ -45,8 +46,8 @@ def frequency_grid(period: int) -> NDArray[np.float64]:
 
 def make_spectrum(density: NDArray[np.float64], period: int) -> FieldSpectrum:
     """Turn a power spectral density (any scale) on `frequency_grid(period)` into mode amplitudes."""
-    # A mode with a mirror image counts twice, one without only once.
-    amplitude = np.sqrt(density * (2.0 / _mode_weight(period))[None, :])
+    # A mode and its mirror image add in amplitude, so doubling them gives four times the variance; two are due.
+    amplitude = np.sqrt(density / _multiplicity(period))
     return FieldSpectrum(amplitude.astype(np.float32), period)
 
 
