@@ -125,6 +125,21 @@ class ConvexSolution:
         """[m] distance between landing point and target, in the target's plane."""
         return float(np.linalg.norm(self.answer.primal[self.layout.position[-1, :2]])) * self.scaled.length
 
+    def trajectory(self, problem: LandingProblem) -> dict[str, Array]:
+        """Time, position, velocity, mass and thrust at the nodes in SI, as a Plan holds them."""
+        primal, layout, scaled = self.answer.primal, self.layout, self.scaled
+        mass = problem.state.mass * np.exp(self.log_mass)
+        position = primal[layout.position] * scaled.length + problem.target
+        velocity = primal[layout.velocity] * (scaled.acceleration * scaled.time)
+        position[0], velocity[0], mass[0] = problem.state.position, problem.state.velocity, problem.state.mass
+        return {
+            "time": np.linspace(0.0, scaled.time, layout.nodes),
+            "position": position,
+            "velocity": velocity,
+            "mass": mass,
+            "thrust": primal[layout.acceleration] * scaled.acceleration * mass[:, None],
+        }
+
 
 class ConvexTemplate:
     """The assembled problem of one ConstraintSet."""
@@ -137,7 +152,7 @@ class ConvexTemplate:
         self._families = constraint_set.families
         self._constant: dict[Family, Rows] = {}
         nominal = _nominal_numbers(constraint_set.nodes)
-        rows = self._rows(nominal)
+        rows = self.rows(nominal)
         for family in (constraints.landing, constraints.altitude_floor, constraints.thrust_cone):
             self._constant[family] = family(self.layout, nominal)
         first = np.cumsum([0] + [part.bound.size for part in rows])
@@ -152,7 +167,8 @@ class ConvexTemplate:
         self.cones = _cones(rows)
         self._solver = ConicSolver(matrix, bound, self.cost(False), self.cones, tolerance)
 
-    def _rows(self, scaled: ScaledProblem) -> list[Rows]:
+    def rows(self, scaled: ScaledProblem) -> list[Rows]:
+        """Constraint rows for given numbers."""
         return [self._constant.get(family) or family(self.layout, scaled) for family in self._families]
 
     @staticmethod
@@ -170,7 +186,7 @@ class ConvexTemplate:
 
     def solve(self, scaled: ScaledProblem, least_error: bool = False) -> ConvexSolution:
         """Solve with new numbers."""
-        rows = self._rows(scaled)
+        rows = self.rows(scaled)
         values, bound = self._numbers(rows)
         cost = self.cost(least_error)
         answer = self._solver.solve(values[self._order], bound, cost)

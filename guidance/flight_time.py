@@ -1,9 +1,9 @@
 """Search for the flight time of least cost, led by the derivative of the optimum.
 
-The cost J(T) of the fixed-time problem falls steeply where T is short and rises with |g|/exhaust velocity (the
-price of hovering) where T is long; J' = a - b/T^2 is exact for an impulsive flight and close for others, so the
-search is a secant on J' in 1/T^2. J' comes from the dual solution and costs nothing. Where the secant stalls, the
-bracket is halved on the sign of J'.
+The cost J(T) of the fixed-time problem falls steeply where T is short, and rises where T is long with a slope that
+nears a = |g|/exhaust velocity, the price of hovering. J' = a - b/(T - c)^2 describes both, so the search is a
+secant (with three samples an inverse parabola) of T over w = (a - J')^(-1/2), in which the model is a straight
+line. J' comes from the dual solution and costs nothing. Where this stalls, the bracket is halved on the sign of J'.
 """
 
 from __future__ import annotations
@@ -18,6 +18,8 @@ import numpy as np
 from guidance.time_window import TimeWindow
 
 _STRETCH = 1.7  # greatest change of the time in one unbracketed step
+_BLIND_STEP = 1.2  # change of the time where nothing is known of the curvature
+_DEAD_TIME = 0.75  # c/T of a typical descent, for the first step
 _PROBES = 24  # times scanned where no feasible time is known
 _MOST_STEPS = 40
 
@@ -51,24 +53,30 @@ Solution = TypeVar("Solution", bound=TimedSolution)
 
 @dataclass(frozen=True)
 class TimeModel:
-    """What is known of J' before the search.
+    """What is known of J' = a - b/(T - c)^2 before the search.
 
     Attributes:
-        asymptote: a in J' = a - b/T^2; zero if unknown.
-        steepness: b, as found by an earlier search; zero if unknown.
+        asymptote: a, or zero if unknown: then J' itself takes the place of w.
+        pace: dT/dw, as found by an earlier search; zero if unknown.
     """
 
     asymptote: float
-    steepness: float = 0.0
+    pace: float = 0.0
+
+    def warp(self, slope: float) -> float:
+        """w, in which T is nearly linear."""
+        if self.asymptote <= 0.0:
+            return slope
+        return 1.0 / math.sqrt(max(self.asymptote - slope, 1e-3 * self.asymptote))
 
     def stationary_time(self, sample: TimedSolution) -> float:
         """[s] where J' of the model through one sample vanishes."""
-        inverse_square = 1.0 / sample.time**2
-        steepness = self.steepness
-        if steepness <= 0.0:
-            steepness = max(self.asymptote - sample.slope, 1e-12) / inverse_square
-        wanted = inverse_square + sample.slope / steepness
-        return 1.0 / math.sqrt(wanted) if wanted > 0.0 else math.inf
+        here, goal = self.warp(sample.slope), self.warp(0.0)
+        if self.pace > 0.0:
+            return sample.time + self.pace * (goal - here)
+        if self.asymptote <= 0.0:
+            return sample.time * (_BLIND_STEP if sample.slope < 0.0 else 1.0 / _BLIND_STEP)
+        return sample.time * (1.0 + (1.0 - _DEAD_TIME) * (goal / here - 1.0))
 
 
 class TimeSearch(Generic[Solution]):
@@ -156,24 +164,40 @@ class TimeSearch(Generic[Solution]):
                 self.high = min(self.high, sample.time)
 
     def _goal(self, latest: Solution) -> float:
-        """[s] where J' should vanish, by a secant in 1/T^2 or, with one sample only, by the model."""
+        """[s] where J' should vanish."""
         feasible = sorted((s for s in self.samples if s.solved), key=lambda s: s.time)
         falling = [s for s in feasible if s.slope < 0.0]
         rising = [s for s in feasible if s.slope >= 0.0]
-        pair = None
-        if falling and rising:
-            pair = falling[-1], rising[0]
-            if self._stalled(pair[0].time, pair[1].time):
-                return 0.5 * (pair[0].time + pair[1].time)
-        elif len(feasible) >= 2:
-            pair = (feasible[-2], feasible[-1]) if falling else (feasible[0], feasible[1])
-        if pair is not None:
-            ends = [1.0 / s.time**2 for s in pair]
-            steepness = (pair[1].slope - pair[0].slope) / max(ends[0] - ends[1], 1e-300)
-            if steepness > 0.0:
-                self.model = TimeModel(self.model.asymptote, steepness)
+        if len(feasible) >= 2:
+            pair = feasible[-2:] if not rising else feasible[:2]
+            if falling and rising:
+                pair = [falling[-1], rising[0]]
+                if self._stalled(pair[0].time, pair[1].time):
+                    return 0.5 * (pair[0].time + pair[1].time)
+            gap = self.model.warp(pair[1].slope) - self.model.warp(pair[0].slope)
+            if gap > 0.0:
+                self.model = TimeModel(self.model.asymptote, (pair[1].time - pair[0].time) / gap)
+            goal = self._parabola(feasible)
+            if falling and rising and goal is not None and pair[0].time < goal < pair[1].time:
+                return goal
         goal = self.model.stationary_time(latest)
         return min(max(goal, latest.time / _STRETCH), latest.time * _STRETCH)
+
+    def _parabola(self, feasible: list[Solution]) -> float | None:
+        """[s] inverse parabola through the three samples nearest to J' = 0, or None."""
+        if len(feasible) < 3:
+            return None
+        goal = self.model.warp(0.0)
+        near = sorted(feasible, key=lambda s: abs(self.model.warp(s.slope) - goal))[:3]
+        w = [self.model.warp(s.slope) - goal for s in near]
+        gaps = (w[0] - w[1]) * (w[0] - w[2]) * (w[1] - w[2])
+        if gaps == 0.0:
+            return None
+        return (
+            near[0].time * w[1] * w[2] * (w[1] - w[2])
+            - near[1].time * w[0] * w[2] * (w[0] - w[2])
+            + near[2].time * w[0] * w[1] * (w[0] - w[1])
+        ) / gaps
 
     def _stalled(self, low: float, high: float) -> bool:
         """Whether the last three samples all fell on one side of the bracket without halving it."""

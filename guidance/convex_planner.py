@@ -1,0 +1,133 @@
+"""Plans by convex optimisation: to the target, or to the softly reachable point nearest to it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from guidance.certificate import Certificate
+from guidance.convex import ConvexSolution
+from guidance.infeasibility import prove_fixed_time, prove_free_time
+from guidance.minimum_propellant import SHARE_TOLERANCE, ConvexTask, minimise_over_time
+from guidance.plan import Plan, PlanStatus
+from guidance.problem import LandingProblem
+
+METHOD = "convex"
+_OVERDRAFT = 1e-9  # in ln(mass): rounding of the solver
+_ERROR_TOLERANCE = 0.02  # [m] gain in landing error below which the time search stops
+_ERROR_SLACK = 0.05  # [m] landing error granted to the least-propellant step
+
+
+def plan_convex(
+    problem: LandingProblem,
+    nodes: int,
+    time_of_flight: float | None = None,
+    guess_time: float | None = None,
+) -> Plan:
+    """Least propellant to the target.
+
+    Args:
+        problem: what to solve.
+        nodes: N.
+        time_of_flight: [s] or None to search for the best.
+        guess_time: [s] start of that search; None to find one on a coarse mesh.
+
+    Returns:
+        A plan that is OPTIMAL, or one without a flight: INFEASIBLE means "not found, proof still to come".
+    """
+    task = ConvexTask(problem, nodes)
+    if time_of_flight is not None:
+        solution, solves = task.solve(time_of_flight), 1
+    else:
+        outcome = minimise_over_time(task, guess=guess_time)
+        solution, solves = outcome.solution, len(outcome.tried)
+        if solution is None and outcome.window.empty:
+            return Plan(PlanStatus.INFEASIBLE, problem, METHOD, message=outcome.window.cause)
+    return _finish(task, solution, solves, PlanStatus.OPTIMAL)
+
+
+def _finish(task: ConvexTask, found: ConvexSolution | None, solves: int, status: PlanStatus) -> Plan:
+    """Refine a solution until the true thrust bounds hold, check the tank, and make it a Plan."""
+    problem = task.problem
+    none = Plan(PlanStatus.INFEASIBLE, problem, METHOD, message="no feasible time of flight found", solves=solves)
+    if found is None:
+        return none
+    if not found.solved:
+        return replace(none, message=f"no flight of {found.time:g} s ({found.answer.words})")
+    if found.propellant_share > problem.log_mass_ratio + _OVERDRAFT:
+        return replace(none, message=_shortage(problem, found))
+    solution = task.refine(found)
+    if not solution.solved or solution.propellant_share > problem.log_mass_ratio + _OVERDRAFT:
+        words = "feasible only with thrust bounds relaxed outward: on the edge of what the lander can do"
+        return replace(none, status=PlanStatus.LIMIT_REACHED, message=words)
+    return Plan(
+        status,
+        problem,
+        METHOD,
+        landing_error=solution.landing_error,
+        message=status.value,
+        solves=solves,
+        **solution.trajectory(problem),
+    )
+
+
+def _shortage(problem: LandingProblem, solution: ConvexSolution) -> str:
+    import math
+
+    needed = problem.state.mass * -math.expm1(-solution.propellant_share)
+    return (
+        f"propellant: the cheapest flight found needs {needed:.2f} kg, "
+        f"{problem.state.mass - problem.lander.dry_mass:.2f} kg are on board"
+    )
+
+
+def prove_infeasible(
+    problem: LandingProblem, nodes: int, time_of_flight: float | None, free_landing_point: bool = False
+) -> Certificate | ConvexSolution | None:
+    """Certificate that no flight exists, or a solution that refutes it, or None where neither was found."""
+    task = ConvexTask(problem, nodes, free_landing_point)
+    if time_of_flight is not None:
+        return prove_fixed_time(task, time_of_flight)
+    return prove_free_time(task)
+
+
+def plan_nearest(problem: LandingProblem, nodes: int, time_of_flight: float | None = None) -> Plan:
+    """Land softly as near to the target as possible, in its plane, then with the least propellant.
+
+    Three convex problems: the cheapest soft landing anywhere (which tells whether there is one), the least landing
+    error with the propellant on board, the least propellant to within that error (Blackmore, Acikmese and Scharf,
+    JGCD 33(4), 2010, "prioritized" scheme).
+
+    Returns:
+        A plan that is NEAREST, or one without a flight (no soft landing anywhere was found).
+    """
+    anywhere = ConvexTask(problem, nodes, free_landing_point=True)
+    nearest = replace(anywhere, least_error=True, limit_propellant=True)
+    if time_of_flight is not None:
+        least = nearest.solve(time_of_flight)
+        solves = 1
+    else:
+        cheapest = minimise_over_time(anywhere)
+        solves = len(cheapest.tried)
+        found = cheapest.solution
+        if found is None or found.propellant_share > problem.log_mass_ratio:
+            message = "no soft landing anywhere in the target's plane was found"
+            if found is not None:
+                message += f"; {_shortage(problem, found)}"
+            return Plan(PlanStatus.INFEASIBLE, problem, METHOD, message=message, solves=solves)
+        outcome = minimise_over_time(nearest, _ERROR_TOLERANCE, found.time)
+        solves += len(outcome.tried)
+        least = outcome.solution or nearest.solve(found.time)
+    if not least.solved:
+        message = f"no soft landing anywhere in the target's plane ({least.answer.words})"
+        return Plan(PlanStatus.INFEASIBLE, problem, METHOD, message=message, solves=solves)
+    refined = nearest.refine(least)
+    error = (refined if refined.solved else least).landing_error
+    economical = replace(anywhere, error_limit=1.001 * error + _ERROR_SLACK)
+    if time_of_flight is not None:
+        last, more = economical.solve(time_of_flight), 1
+    else:
+        outcome = minimise_over_time(economical, SHARE_TOLERANCE, least.time)
+        last, more = outcome.solution, len(outcome.tried)
+        if last is not None and last.propellant_share > problem.log_mass_ratio + _OVERDRAFT:
+            last, more = economical.solve(least.time), more + 1
+    return _finish(economical, last, solves + more, PlanStatus.NEAREST)

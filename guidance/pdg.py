@@ -1,0 +1,157 @@
+"""Powered-descent guidance: `solve_pdg`, the public entry to every solver.
+
+    python -m guidance.pdg --state 200 100 950 -8 -4 -30 1200 --target 0 0 50 --plot plan.png
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from guidance.certificate import Certificate
+from guidance.constants import MOON_GRAVITY
+from guidance.errors import InfeasibleError, SolverFailedError
+from guidance.lander import PAPER_LANDER, Lander
+from guidance.plan import Plan, PlanStatus
+from guidance.problem import LandingProblem
+from guidance.state import State
+from guidance.validation import finite_number, finite_vector
+
+DEFAULT_NODES = 61
+"""Nodes of a plan unless asked otherwise: they cost about 5 g of propellant on the paper's descents."""
+FEWEST_NODES = 5
+METHODS = ("convex", "casadi", "cvxpy")
+UNREACHABLE = ("raise", "nearest")
+
+
+def solve_pdg(
+    state: State | Sequence[float] | np.ndarray,
+    target: ArrayLike,
+    *,
+    lander: Lander = PAPER_LANDER,
+    gravity: ArrayLike = MOON_GRAVITY,
+    glide_slope_limit: float | None = None,
+    speed_limit: float | None = None,
+    time_of_flight: float | None = None,
+    nodes: int = DEFAULT_NODES,
+    method: Literal["convex", "casadi", "cvxpy"] = "convex",
+    unreachable: Literal["raise", "nearest"] = "raise",
+    guess: Plan | None = None,
+    throw: bool = True,
+) -> Plan:
+    """Plan the descent from `state` to rest on `target` that burns the least propellant.
+
+    Args:
+        state: State, or seven numbers (x, y, z, vx, vy, vz, mass).
+        target: [m] shape (3,), site frame; the trajectory never goes below its altitude.
+        lander: the vehicle. Its pointing limit is measured from the z axis.
+        gravity: [m/s^2] shape (3,).
+        glide_slope_limit: [rad] greatest angle from the z axis, seen from the landing point, in (0, pi/2].
+        speed_limit: [m/s] greatest speed.
+        time_of_flight: [s] None searches for the best.
+        nodes: N; the plan has N - 1 intervals of equal duration.
+        method: 'convex' (lossless convexification in Clarabel; fast), 'cvxpy' (the same problem, written for
+            reading) or 'casadi' (the unrelaxed nonconvex problem by IPOPT).
+        unreachable: what to do where the target is out of reach: 'raise', or plan to the softly reachable point
+            'nearest' to it in its plane (always by the convex method).
+        guess: an earlier Plan of nearly the same flight: what is left of it seeds the search.
+        throw: raise where there is no flight; otherwise return a Plan that says why.
+
+    Returns:
+        A Plan. With `throw=False` its status may be one without a flight.
+
+    Raises:
+        ValueError: an argument is out of range, not finite or of the wrong shape.
+        InfeasibleError: no flight within the limits exists; proved by `error.plan.certificate`.
+        SolverFailedError: the solver gave no answer.
+    """
+    problem = LandingProblem(
+        State.parse(state),
+        finite_vector("target", target, 3),
+        lander,
+        finite_vector("gravity", gravity, 3),
+        glide_slope_limit,
+        speed_limit,
+    )
+    _check_choices(nodes, method, unreachable, guess)
+    if time_of_flight is not None:
+        time_of_flight = finite_number("time_of_flight", time_of_flight, above=0.0)
+    plan = _plan(problem, nodes, time_of_flight, method, guess)
+    if plan.status is not PlanStatus.OPTIMAL:
+        plan = _without_flight(plan, nodes, time_of_flight, unreachable)
+    if throw and not plan.status.has_flight:
+        kind = InfeasibleError if plan.status is PlanStatus.INFEASIBLE else SolverFailedError
+        raise kind(f"{plan.status.value}: {plan.message}", plan)
+    return plan
+
+
+def _check_choices(nodes: int, method: str, unreachable: str, guess: Plan | None) -> None:
+    if isinstance(nodes, bool) or not isinstance(nodes, int | np.integer) or nodes < FEWEST_NODES:
+        raise ValueError(f"nodes must be an integer of at least {FEWEST_NODES}, got {nodes!r}")
+    if method not in METHODS:
+        raise ValueError(f"method must be one of {', '.join(METHODS)}, got {method!r}")
+    if unreachable not in UNREACHABLE:
+        raise ValueError(f"unreachable must be one of {', '.join(UNREACHABLE)}, got {unreachable!r}")
+    if guess is not None and not isinstance(guess, Plan):
+        raise ValueError(f"guess must be a Plan, got {type(guess).__name__}")
+
+
+def time_left(guess: Plan, state: State) -> float | None:
+    """[s] what is left of an earlier plan at its node nearest to `state`; None if nothing is."""
+    if guess.nodes == 0:
+        return None
+    pace = guess.time_of_flight
+    gap = np.linalg.norm(guess.position - state.position, axis=1) + 0.1 * pace * np.linalg.norm(
+        guess.velocity - state.velocity, axis=1
+    )
+    left = guess.time_of_flight - float(guess.time[int(gap.argmin())])
+    return left if left > 0.0 else None
+
+
+def _plan(
+    problem: LandingProblem, nodes: int, time_of_flight: float | None, method: str, guess: Plan | None
+) -> Plan:
+    """Plan by the chosen method; a plan without a flight still lacks its proof."""
+    if method == "convex":
+        from guidance.convex_planner import plan_convex
+
+        seed = None if guess is None else time_left(guess, problem.state)
+        return plan_convex(problem, nodes, time_of_flight, seed)
+    if method == "cvxpy":
+        from guidance.reference_cvxpy import plan_cvxpy
+
+        return plan_cvxpy(problem, nodes, time_of_flight)
+    from guidance.reference_casadi import plan_casadi
+
+    return plan_casadi(problem, nodes, time_of_flight, guess)
+
+
+def _without_flight(plan: Plan, nodes: int, time_of_flight: float | None, unreachable: str) -> Plan:
+    """Tell infeasible from failed by the convex problem's certificate, or fly to the nearest reachable point."""
+    from guidance.convex_planner import plan_convex, plan_nearest, prove_infeasible
+
+    problem, anywhere = plan.problem, False
+    if unreachable == "nearest":
+        nearest = plan_nearest(problem, nodes, time_of_flight)
+        if nearest.status.has_flight:
+            return nearest
+        anywhere = nearest.status is PlanStatus.INFEASIBLE
+        if anywhere:
+            plan = replace(nearest, method=plan.method)
+    proof = prove_infeasible(problem, nodes, time_of_flight, anywhere)
+    if isinstance(proof, Certificate):
+        limits = ", ".join(proof.causes)
+        message = plan.message if plan.message.startswith("propellant") else f"{plan.message} (limits: {limits})"
+        return replace(plan, status=PlanStatus.INFEASIBLE, certificate=proof, message=message)
+    if plan.method == "convex" and proof is not None and time_of_flight is None and not anywhere:
+        retry = plan_convex(problem, nodes, None, proof.time)
+        if retry.status.has_flight:
+            return retry
+    if plan.status is PlanStatus.INFEASIBLE:
+        message = f"{plan.message}; infeasibility could not be proved"
+        return replace(plan, status=PlanStatus.LIMIT_REACHED, message=message)
+    return plan
