@@ -57,15 +57,15 @@ def clustered_interval(success: ArrayLike, tile: ArrayLike, confidence: float = 
     """Interval of a success ratio over episodes that come in clusters, one per tile of terrain.
 
     Wilson's interval at an effective number of episodes n_eff = n / D (z/t)^2 (Korn and Graubard, Survey
-    Methodology 24, 1998). D is the design effect: the variance of the ratio from the totals of the C tiles by
-    linearisation, C/(C - 1) sum_c (successes_c - ratio episodes_c)^2 / n^2, over ratio (1 - ratio) / n, that of
-    independent episodes. It is taken as at least 1, so that luck never makes the interval narrower than Wilson's.
-    z and t are the normal quantile and Student's at C - 1 degrees of freedom: few tiles tell their variance
-    badly.
+    Methodology 24, 1998). D is the design effect: the variance of the ratio from the totals of the C tiles
+    by linearisation, C/(C - 1) sum_c (successes_c - ratio episodes_c)^2 / n^2, over ratio (1 - ratio) / n,
+    that of independent episodes. It is taken as at least 1, so that luck never makes the interval narrower
+    than Wilson's. z and t are the normal quantile and Student's at C - 1 degrees of freedom: few tiles tell
+    their variance badly.
 
-    Where all episodes end alike nothing shows how tiles differ, and D is 1: the interval may then be too narrow.
-    One tile says nothing of others: the interval is [0, 1]. Very unequal numbers of episodes per tile cost some
-    points of coverage (92 % in place of 95 % at 18 tiles of geometrically distributed size).
+    Where all episodes end alike nothing shows how tiles differ, and D is 1: the interval may then be too
+    narrow. One tile says nothing of others: the interval is [0, 1]. Very unequal numbers of episodes per tile
+    cost some points of coverage (92 % in place of 95 % at 18 tiles of geometrically distributed size).
 
     Args:
         success: shape (n,), booleans or zeros and ones.
