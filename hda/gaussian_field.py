@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,7 +47,7 @@ def frequency_grid(period: int) -> NDArray[np.float64]:
 
 def make_spectrum(density: NDArray[np.float64], period: int) -> FieldSpectrum:
     """Turn a power spectral density (any scale) on `frequency_grid(period)` into mode amplitudes."""
-    # A mode and its mirror image add in amplitude, so doubling them gives four times the variance; two are due.
+    # A mode and its mirror image add in amplitude: four times the variance, where twice is due.
     amplitude = np.sqrt(density / _multiplicity(period))
     return FieldSpectrum(amplitude.astype(np.float32), period)
 
@@ -55,7 +56,7 @@ def fast_period(cells: int) -> int:
     """Smallest even FFT length with small prime factors that holds `cells`."""
     from scipy.fft import next_fast_len
 
-    return 2 * int(next_fast_len((cells + 1) // 2, real=True) or 0)
+    return 2 * cast("int", next_fast_len((cells + 1) // 2, real=True))
 
 
 def synthesise_field(spectrum: FieldSpectrum, size: int, rng: np.random.Generator) -> NDArray[np.float32]:
