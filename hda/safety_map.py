@@ -115,8 +115,7 @@ def assess_safety(
     footprint = make_footprint(criteria.footprint_diameter, criteria.pad_diameter, pixel_size)
     elevation = _check_dem(dem, footprint)
     hole = np.isnan(elevation)
-    if hole.any():
-        elevation = np.where(hole, 0.0, elevation)
+    elevation[hole] = 0.0  # any number: what it touches is marked unknown below
     slope, roughness, excess = _worst_case(elevation, footprint, pixel_size, criteria.max_roughness)
     known = _known_sites(hole, footprint)
     slope[~known] = np.nan
@@ -132,7 +131,7 @@ def assess_safety(
 
 def _check_dem(dem: ArrayLike, footprint: LanderFootprint) -> NDArray[np.float64]:
     try:
-        elevation = np.ascontiguousarray(dem, dtype=np.float64)
+        elevation = np.array(dem, dtype=np.float64, order="C")  # a copy: holes are filled in it
     except (TypeError, ValueError) as error:
         raise ValueError("dem must be an array of numbers") from error
     if np.ndim(dem) != 2:

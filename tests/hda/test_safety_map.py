@@ -61,6 +61,9 @@ def test_the_lander_keeps_its_size_at_any_pixel_size(pixel_size: float):
     # The outer edge of the pads lies on the 10 m circle, to a cell.
     assert np.all(np.abs(distance + 0.5 - 5.0) < pixel_size)
     assert footprint.reach == {1.0: 5, 0.5: 10, 0.25: 20, 0.2: 25, 0.1: 50}[pixel_size]
+    if pixel_size == 0.1:
+        assert len(footprint.pads) == 64
+        assert len(footprint.footprint_cells(0)) == 45**2 + 44**2
 
 
 @pytest.mark.parametrize("radius", range(1, 61))

@@ -19,6 +19,7 @@ from hda.rocks import RockPopulation, rock_margin
 from hda.safety_map import assess_safety
 from hda.terrain import TerrainParameters, generate_terrain, terrain_rng
 from hda.terrain_picture import show_terrain
+from hda.terrain_timing import measure_terrain
 
 DEFAULT = TerrainParameters()
 SMALL = replace(DEFAULT, size=240)
@@ -261,6 +262,15 @@ def test_the_command_draws_a_tile_and_says_what_it_is_like(tmp_path: Path, capsy
     assert f"hazard share      {hazard:.3f}" in printed
     assert "RMS slope" in printed
     assert "generation time" in printed
+
+
+def test_timings_are_of_the_asked_number_of_runs():
+    timings = measure_terrain(repeats=2, size=64)
+    assert timings[0].name == "terrain, 64 x 64 cells of 1 m"
+    assert timings[1].name == "safety map, 64 x 64 cells of 1 m, 1 thread"
+    assert all(len(timing.seconds) == 2 and 0.0 < timing.median < 60.0 for timing in timings)
+    with pytest.raises(ValueError, match="repeats"):
+        measure_terrain(repeats=0)
 
 
 def test_the_command_refuses_a_negative_seed():
