@@ -38,7 +38,7 @@ def plan_convex(
     if time_of_flight is not None:
         solution, solves = task.solve(time_of_flight), 1
     else:
-        outcome = minimise_over_time(task, guess=guess_time)
+        outcome = minimise_over_time(task, guess=guess_time, coarse_first=guess_time is None)
         solution, solves = outcome.solution, len(outcome.tried)
         if solution is None and outcome.window.empty:
             return Plan(PlanStatus.INFEASIBLE, problem, METHOD, message=outcome.window.cause)
@@ -126,7 +126,7 @@ def plan_nearest(problem: LandingProblem, nodes: int, time_of_flight: float | No
     if time_of_flight is not None:
         last, more = economical.solve(time_of_flight), 1
     else:
-        outcome = minimise_over_time(economical, SHARE_TOLERANCE, least.time)
+        outcome = minimise_over_time(economical, SHARE_TOLERANCE, least.time, coarse_first=False)
         last, more = outcome.solution, len(outcome.tried)
         if last is not None and last.propellant_share > problem.log_mass_ratio + _OVERDRAFT:
             last, more = economical.solve(least.time), more + 1

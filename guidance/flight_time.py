@@ -13,14 +13,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
-import numpy as np
-
 from guidance.time_window import TimeWindow
 
 _STRETCH = 1.7  # greatest change of the time in one unbracketed step
-_BLIND_STEP = 1.2  # change of the time where nothing is known of the curvature
+_BLIND_STEP = 1.25  # change of the time where nothing is known of the curvature
 _DEAD_TIME = 0.75  # c/T of a typical descent, for the first step
-_PROBES = 24  # times scanned where no feasible time is known
 _MOST_STEPS = 40
 
 
@@ -128,7 +125,7 @@ class TimeSearch(Generic[Solution]):
             if found is None:
                 return None
             latest = found
-        while len(self.samples) < _MOST_STEPS:
+        while len(self.samples) < _MOST_STEPS and not self._closed():
             goal = self._goal(latest)
             step = min(max(goal, self.low), self.high)
             if 0.5 * abs(latest.slope * (step - latest.time)) < self._tolerance and latest.solved:
@@ -144,8 +141,8 @@ class TimeSearch(Generic[Solution]):
 
     def _probe(self, guess: float) -> Solution | None:
         """First feasible time on a grid, longer times first, nearest to the guess first."""
-        grid = np.geomspace(self.low, self.high, _PROBES)
-        longer, shorter = grid[grid > guess], grid[grid <= guess][::-1]
+        grid = TimeWindow(self.low, self.high).grid()
+        longer, shorter = list(grid[grid > guess]), list(grid[grid <= guess][::-1])
         order = [t for pair in zip(longer, shorter, strict=False) for t in pair]
         rest = longer[len(shorter) :] if len(longer) > len(shorter) else shorter[len(longer) :]
         for time in [*order, *rest]:
@@ -172,11 +169,11 @@ class TimeSearch(Generic[Solution]):
             pair = feasible[-2:] if not rising else feasible[:2]
             if falling and rising:
                 pair = [falling[-1], rising[0]]
-                if self._stalled(pair[0].time, pair[1].time):
-                    return 0.5 * (pair[0].time + pair[1].time)
+                if self._stalled():
+                    return _tangents_cross(*pair)[0]
             gap = self.model.warp(pair[1].slope) - self.model.warp(pair[0].slope)
-            if gap > 0.0:
-                self.model = TimeModel(self.model.asymptote, (pair[1].time - pair[0].time) / gap)
+            pace = (pair[1].time - pair[0].time) / gap if gap > 0.0 else 0.0  # zero where J is concave
+            self.model = TimeModel(self.model.asymptote, pace)
             goal = self._parabola(feasible)
             if falling and rising and goal is not None and pair[0].time < goal < pair[1].time:
                 return goal
@@ -199,10 +196,27 @@ class TimeSearch(Generic[Solution]):
             + near[2].time * w[0] * w[1] * (w[0] - w[1])
         ) / gaps
 
-    def _stalled(self, low: float, high: float) -> bool:
-        """Whether the last three samples all fell on one side of the bracket without halving it."""
-        last = [s for s in self.samples[-3:] if s.solved]
-        if len(last) < 3:
+    def _stalled(self) -> bool:
+        """Whether the last two samples fell on one side of the optimum: the cost has a kink, tangents are better."""
+        last = [s.slope < 0.0 for s in self.samples[-3:] if s.solved]
+        return len(last) == 3 and last[-1] == last[-2]
+
+    def _closed(self) -> bool:
+        """Whether the tangents of the samples next to the optimum leave nothing to gain (J convex between)."""
+        falling = [s for s in self.samples if s.solved and s.slope < 0.0]
+        rising = [s for s in self.samples if s.solved and s.slope >= 0.0]
+        if self.best is None or not falling or not rising:
             return False
-        signs = {s.slope < 0.0 for s in last}
-        return len(signs) == 1 and high - low > 0.5 * abs(last[0].time - last[-1].time)
+        left, right = max(falling, key=lambda s: s.time), min(rising, key=lambda s: s.time)
+        return self.best.value - _tangents_cross(left, right)[1] < self._tolerance
+
+
+def _tangents_cross(left: TimedSolution, right: TimedSolution) -> tuple[float, float]:
+    """Time and cost where the tangents at two samples on either side of the optimum meet."""
+    if right.slope == left.slope:
+        return left.time, min(left.value, right.value)
+    time = (left.value - right.value + right.slope * right.time - left.slope * left.time) / (
+        right.slope - left.slope
+    )
+    time = min(max(time, min(left.time, right.time)), max(left.time, right.time))
+    return time, left.value + left.slope * (time - left.time)

@@ -13,8 +13,6 @@ from guidance.minimum_propellant import ConvexTask
 from guidance.scaling import scale_problem
 from guidance.time_window import time_window
 
-_GRID = 16
-
 
 def prove_at(task: ConvexTask, time: float) -> FarkasProof | ConvexSolution:
     """Proof that no flight lasts `time`, or the solution that kept it from being found.
@@ -66,7 +64,7 @@ def prove_free_time(task: ConvexTask, also: tuple[float, ...] = ()) -> Certifica
         scope = f"every time of flight, on any mesh: closed-form bound on {window.cause}"
         return Certificate(scope, (window.cause,))
     proofs = []
-    times = np.union1d(window.grid(_GRID), np.array(also))
+    times = np.union1d(window.grid(), np.array(also))
     for time in times:
         proof = prove_at(task, float(time))
         if isinstance(proof, FarkasProof):

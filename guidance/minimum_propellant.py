@@ -18,8 +18,8 @@ Array = NDArray[np.float64]
 _THRUST_TOLERANCE = 5e-4  # relative; half of what a plan promises
 _COARSE_NODES = 16
 _MOST_REFINEMENTS = 8
-SHARE_TOLERANCE = 2e-6
-"""Gain in ln(mass) below which the time search stops: 2.4 g of propellant at 1200 kg."""
+SHARE_TOLERANCE = 4e-6
+"""Gain in ln(mass) below which the time search stops: 5 g of propellant at 1200 kg."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,17 +109,21 @@ def _asymptote(task: ConvexTask) -> float:
 
 
 def minimise_over_time(
-    task: ConvexTask, tolerance: float = SHARE_TOLERANCE, guess: float | None = None
+    task: ConvexTask,
+    tolerance: float = SHARE_TOLERANCE,
+    guess: float | None = None,
+    coarse_first: bool = True,
 ) -> TimeOutcome:
     """Search the time of flight of least cost.
 
-    Without a guess the time, the thrust bounds' linearisation and the curvature of the cost come from a search on
-    a coarse mesh, so that one or two solves are left for the fine one.
+    The time, the thrust bounds' linearisation and the curvature of the cost come from a search on a coarse mesh
+    first, so that one or two solves are left for the fine one.
 
     Args:
         task: what is solved at each time.
         tolerance: gain below which the search stops, in units of the task's cost.
-        guess: [s] time to start from; None to start from the coarse mesh.
+        guess: [s] time to start from; None for coast and brake.
+        coarse_first: False where the guess is good enough to go without the coarse mesh.
     """
     window = time_window(task.problem, task.free_landing_point)
     if window.empty:
@@ -127,7 +131,8 @@ def minimise_over_time(
     model = TimeModel(_asymptote(task))
     reference: Array | None = None
     start = guess_time(task.problem, window) if guess is None else guess
-    if guess is None and task.nodes > 1.5 * _COARSE_NODES:
+    start = min(max(start, window.low), window.high)
+    if coarse_first and task.nodes > 1.5 * _COARSE_NODES:
         coarse = replace(task, nodes=_COARSE_NODES, tolerance=1e-6)
         search = TimeSearch(coarse.solve, window, 2.0 * tolerance, model)
         found = search.run(start)
@@ -136,7 +141,6 @@ def minimise_over_time(
             if not bounds_hold(task.problem, found, None):
                 refined = coarse.refine(found)
                 reference = refined.log_mass if refined.solved else None
-    start = min(max(start, window.low), window.high)
 
     def evaluate(time: float) -> ConvexSolution:
         solution = task.solve(time, reference)

@@ -32,9 +32,10 @@ class TimeWindow:
         """Whether no time is admitted."""
         return self.high < self.low
 
-    def grid(self, count: int) -> Array:
-        """`count` times from end to end in geometric progression."""
-        return np.geomspace(self.low, self.high, count)
+    def grid(self) -> Array:
+        """Times from end to end in geometric progression: 6 % apart, but at least 4 and at most 24 of them."""
+        count = math.ceil(math.log(self.high / self.low) / math.log(1.06)) + 1
+        return np.geomspace(self.low, self.high, min(max(count, 4), 24))
 
 
 def _square(*coefficients: Array) -> Array:
