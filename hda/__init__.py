@@ -1,7 +1,7 @@
 """The hazard-avoidance world: terrain, safety maps, the LIDAR, the simulator, and the policy seam.
 
-Frame: site-fixed, x east, y north, z up, metres; origin at the map's south-west corner; map[row, column] with row
-north and column east.
+Frame: site-fixed, x east, y north, z up, metres; origin at the map's south-west corner; map[row, column] with
+row north and column east.
 """
 
 from typing import TYPE_CHECKING

@@ -1,8 +1,8 @@
 """The tiles of terrain that studies fly over: seeded, split, built on demand, cached per user.
 
-A tile's number is its seed. The splits never mix: training ground, ground to tune on, ground to evaluate on, and
-fresh ground for reliability runs. Every parameter of the terrain and of its assessment, and the format version, go
-into the cache key, so a change of any of them builds anew.
+A tile's number is its seed. The splits never mix: training ground, ground to tune on, ground to evaluate on,
+and fresh ground for reliability runs. Every parameter of the terrain and of its assessment, and the format
+version, go into the cache key, so a change of any of them builds anew.
 """
 
 from __future__ import annotations
@@ -36,7 +36,8 @@ SPLITS: dict[str, range] = {
     "validation": range(1000, 1018),
     "fresh": range(10_000, 10_400),
 }
-"""Tile numbers: `train` for learning, `tuning` for every choice, `validation` and `fresh` for evaluation only."""
+"""Tile numbers: `train` for learning, `tuning` for every choice, `validation` and `fresh` for evaluation
+only."""
 
 _LAYERS = ("elevation", "probability", "deterministic")
 _verified: set[Path] = set()
@@ -57,7 +58,7 @@ class Ground:
     def description(self) -> str:
         """Every parameter as JSON, sorted."""
         parts = {"format": FORMAT_VERSION, "terrain": asdict(self.terrain), "criteria": asdict(self.criteria)}
-        return json.dumps(parts, sort_keys=True, indent=1)
+        return json.dumps(parts, sort_keys=True, indent=1, default=str)
 
     def folder(self) -> Path:
         """Where this ground's tiles are kept."""
@@ -124,11 +125,20 @@ def prepare_tiles(ground: Ground, split: str, workers: int = 2, numbers: Iterabl
                 _open_or_build(ground, number)
                 progress.advance(task)
             return
-        with ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_use_one_thread) as pool:
+        with ProcessPoolExecutor(
+            workers, mp_context=get_context("spawn"), initializer=_use_one_thread
+        ) as pool:
             futures = [pool.submit(_build_and_store, ground, number) for number in missing]
             for future in as_completed(futures):
                 future.result()
                 progress.advance(task)
+
+
+def remove_tiles(ground: Ground) -> None:
+    """Remove every cached tile of a ground; they are built again on demand."""
+    _open_or_build.cache_clear()
+    _verified.clear()
+    shutil.rmtree(ground.folder(), ignore_errors=True)
 
 
 def _use_one_thread() -> None:

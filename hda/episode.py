@@ -72,7 +72,8 @@ class EpisodeRecord:
         segments: the flown path after each decision, at the control rate.
         rewards: reward terms of each decision.
         outcome: how it ended.
-        minimum_slant_angle: [rad] least elevation of the lander seen from the current target at decision instants.
+        minimum_slant_angle: [rad] least elevation of the lander seen from the current target at decision
+            instants.
         decision_time: [s] shape (decisions,), wall time that the policy took; not reproducible.
     """
 

@@ -1,8 +1,9 @@
 """The safety map that the LIDAR gives at one look: the paper's Algorithm 2.
 
-A square, axis-aligned window of 64 x 64 pixels, centred on the current target, width w = r_s tan(field of view). Each
-pixel takes the probability of safety at the nearest cell of the true map, plus Gaussian noise in proportion to
-the range, clipped to [0, 1]. Pixels seen too far from the vertical, and outside the map, read 0.
+A square, axis-aligned window of 64 x 64 pixels, centred on the current target, width w = r_s tan(field of
+view). Each pixel takes the probability of safety at the nearest cell of the true map, plus Gaussian noise in
+proportion to the range, clipped to [0, 1]. Pixels seen too far from the vertical, and outside the map, read
+0.
 """
 
 from __future__ import annotations
@@ -26,7 +27,8 @@ class Lidar:
         pixels: pixels along each side of the look.
         noise: standard deviation of the observed probability at `noise_range`, growing with range.
         noise_range: [m] range to which `noise` refers.
-        off_nadir_limit: [rad] pixels further than this from the lander's vertical read 0 (slant angle under 70 deg).
+        off_nadir_limit: [rad] pixels further than this from the lander's vertical read 0 (slant angle under
+            70 deg).
     """
 
     field_of_view: float = math.radians(11.4)
@@ -58,7 +60,7 @@ def _look_into(
     sensor: tuple[float, float, float],
     out: NDArray[np.float32],
 ) -> None:
-    """Fill `out` with the observed map; `sensor` = (width m, noise per metre of range, tan of off-nadir limit)."""
+    """Fill `out` with the observed map; `sensor` is (width m, noise per metre, tan of the off-nadir limit)."""
     width, noise_per_metre, limit = sensor
     rows, columns = probability.shape
     n = out.shape[0]

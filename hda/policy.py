@@ -100,7 +100,7 @@ class Policy(Protocol[Memory]):
         ...
 
     def begin(self, scenario_view: ScenarioView, rng: np.random.Generator) -> Memory:
-        """Memory before the first look; `rng` is the policy's own stream, to be kept in the memory if needed."""
+        """Memory before the first look; `rng` is the policy's own stream, kept in the memory if needed."""
         ...
 
     def decide(self, observation: Observation, memory: Memory) -> tuple[Decision, Memory]:
@@ -112,7 +112,10 @@ class Policy(Protocol[Memory]):
 class PrivilegedPolicy(Protocol):
     """A policy that sees the true map. `fly` gives it the truth; every table marks it."""
 
-    privileged: bool
+    @property
+    def privileged(self) -> bool:
+        """Always true."""
+        ...
 
     @property
     def name(self) -> str:

@@ -1,7 +1,7 @@
 """The named settings of the benchmark, and scenarios drawn from them.
 
-The numbers of `paper` and `hard` come from `python -m studies.calibrate` on the tuning tiles; the README shows what
-they give beside the paper's row.
+The numbers of `paper` and `hard` come from `python -m studies.calibrate` on the tuning tiles; the README
+shows what they give beside the paper's row.
 """
 
 from __future__ import annotations
@@ -10,11 +10,30 @@ import difflib
 from collections.abc import Iterable
 
 from hda.dtm_library import Ground, load_tile, tile_numbers
+from hda.islands import IslandField
 from hda.random_streams import EpisodeStreams
+from hda.rocks import RockPopulation
 from hda.scenario import Preset, Scenario, draw_scenario
+from hda.terrain import TerrainParameters
+
+BLOCKY_ROCKS = RockPopulation(area_fraction=0.3, decay_constant=0.6, decay_slope=0.0)
+"""Dense large blocks, of which almost no pin-hole of safe ground is left between the islands. The Mars fit's
+q (2.55 at k = 0.2) leaves 1.5 % of the rocky ground safe in specks, this 0.04 %; an engineering choice, not a
+site."""
+
 
 PRESETS: dict[str, Preset] = {
-    "paper": Preset(name="paper"),
+    preset.name: preset
+    for preset in (
+        Preset(
+            name="paper",
+            terrain=TerrainParameters(rocks=BLOCKY_ROCKS, islands=IslandField(20.0, threshold=-0.8)),
+        ),
+        Preset(
+            name="hard",
+            terrain=TerrainParameters(rocks=BLOCKY_ROCKS, islands=IslandField(20.0, threshold=-1.2)),
+        ),
+    )
 }
 
 

@@ -1,8 +1,8 @@
 """Common random numbers: what chance does to an episode, whatever the policy does.
 
-`SeedSequence([study_seed, episode]).spawn(4)` gives the scenario, sensor, actuator and policy streams. Look k and
-interval k draw from children of their own, keyed by k, so that two policies that fly the same episode meet the
-same noise at the same look, even if one of them draws more or flies longer.
+`SeedSequence([study_seed, episode]).spawn(4)` gives the scenario, sensor, actuator and policy streams. Look k
+and interval k draw from children of their own, keyed by k, so that two policies that fly the same episode
+meet the same noise at the same look, even if one of them draws more or flies longer.
 """
 
 from __future__ import annotations

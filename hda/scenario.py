@@ -31,7 +31,8 @@ class Rules:
         decision_interval: [s] time between looks (paper: 5 s, the processing time of ALHAT).
         control_period: [s] time over which a thrust is held; the decision interval over a whole number.
         max_decisions: an episode still in flight after so many is truncated.
-        thrust_error: bound of the relative thrust error, uniform, one draw per decision interval (paper: 0.05).
+        thrust_error: bound of the relative thrust error, uniform, one draw per decision interval (paper:
+            0.05).
         crash_speed: [m/s] a faster touchdown is a crash.
         soft_speed: [m/s] `success` asks for a touchdown no faster, vertically and horizontally.
 
@@ -99,7 +100,8 @@ class StartConditions:
         distance: [m] horizontal distance to the first target.
         descent_speed: [m/s] downward.
         horizontal_speed: [m/s].
-        approach_spread: [rad] the horizontal velocity points toward the target within this angle on either side.
+        approach_spread: [rad] the horizontal velocity points toward the target within this angle on either
+            side.
         mass: [kg].
         target_area: [m] x and y of the first target lie in this range.
         hazard_radius: [m] radius around the first target within which ...
@@ -181,7 +183,9 @@ class Scenario:
         )
 
 
-def draw_target(tile: Tile, start: StartConditions, plane: float, rng: np.random.Generator) -> NDArray[np.float64]:
+def draw_target(
+    tile: Tile, start: StartConditions, plane: float, rng: np.random.Generator
+) -> NDArray[np.float64]:
     """Draw the first target: uniform over the target area, where enough of the ground around is unsafe.
 
     Raises:

@@ -109,7 +109,7 @@ class NearestSafeSite:
 
 @lru_cache(maxsize=32)
 def safe_clearance(tile: Tile) -> NDArray[np.float32]:
-    """[m] shape of the tile: distance from each cell's centre to the nearest unsafe cell's edge, along an axis.
+    """[m] from each cell's centre to the nearest unsafe cell's edge along an axis; shape of the tile.
 
     Zero or less on unsafe cells; the outside of the map is unsafe.
     """
@@ -136,7 +136,7 @@ def nearest_clear_site(tile: Tile, target: Site, clearance: float) -> Site:
 
 @dataclass(frozen=True, eq=False)
 class OracleSite:
-    """Privileged: the truly safe cell nearest to the first target with some clearance, chosen at the first look.
+    """Privileged: the truly safe cell nearest to the first target with some clearance.
 
     Attributes:
         truth: the tile that is being flown.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,7 +15,8 @@ from hda.safety_map import SafetyCriteria, assess_safety
 class Tile:
     """A digital terrain model at 1 m a cell with Algorithm 1's verdict on it.
 
-    Cell (row, column) is centred at (column + 1/2, row + 1/2) m; row 0 is the south edge. Arrays are read-only.
+    Cell (row, column) is centred at (column + 1/2, row + 1/2) m; row 0 is the south edge. Arrays are
+    read-only.
 
     Attributes:
         number: tile number in the library, or -1 for a tile that is not from the library.
@@ -90,7 +91,7 @@ def make_tile(
     if not np.isfinite(heights).any():
         raise ValueError("dem must hold at least one finite height")
     elevation = (heights - np.nanmax(heights) + maximum_elevation).astype(np.float32)
-    safety = assess_safety(elevation.astype(np.float64), 1.0, **criteria.as_keywords())
+    safety = assess_safety(elevation.astype(np.float64), 1.0, **asdict(criteria))
     return Tile(
         number=number,
         elevation=elevation,

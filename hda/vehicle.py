@@ -1,9 +1,10 @@
 """The vehicle between two looks: it flies a command at the control rate and saturates the thrust.
 
-At each control instant the law gives a thrust, the engine saturates it, applies it with this interval's relative
-error, and holds it for one control period; motion under a held thrust is exact (`guidance.dynamics`). When the time
-to go falls to half a control period the engine is cut off and the vehicle falls freely to the target plane. The
-flight ends where the plane is crossed, whatever the engine does.
+At each control instant the law gives a thrust, the engine saturates it, applies it with this interval's
+relative error, and holds it for one control period; motion under a held thrust is exact
+(`guidance.dynamics`). When the time to go falls to half a control period the engine is cut off and the
+vehicle falls freely to the target plane. The flight ends where the plane is crossed, whatever the engine
+does.
 """
 
 from __future__ import annotations
@@ -151,7 +152,7 @@ def hold_period(
     plane: float,
     out: NDArray[np.float64],
 ) -> tuple[float, int]:
-    """Apply a saturated command for one period, ended early by the ground or the tank: (time flown, status)."""
+    """Apply a command for one period, ended early by the ground or the tank: (time flown, status)."""
     applied = commanded * (1.0 + thrust_error)
     flow = math.sqrt(applied[0] ** 2 + applied[1] ** 2 + applied[2] ** 2) / vehicle[2]
     burn = duration

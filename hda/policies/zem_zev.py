@@ -36,4 +36,8 @@ class FixedGainZemZev:
         remaining = observation.time_to_go
         if not np.array_equal(site, observation.target):
             remaining = time_to_go(observation.state, site, memory)
-        return ZemZevCommand(self.position_gain, self.velocity_gain, remaining), DecisionStatus.NOMINAL, memory
+        return (
+            ZemZevCommand(self.position_gain, self.velocity_gain, remaining),
+            DecisionStatus.NOMINAL,
+            memory,
+        )

@@ -1,0 +1,247 @@
+"""Calibrating a preset: make Single Divert land as often as the target says, on the tuning tiles.
+
+Single Divert needs no learning, and the paper gives its row, so a terrain on which it does what it did in the
+paper makes the paper's other figures a fair bar. It fails where no safe pixel lies in its one view, so what
+is searched is the islands of clear ground: their size for `paper`, their number (the threshold of the field)
+for `hard`. The control period is swept beside it, because the final speed depends on it and on little else.
+Only tuning tiles are flown.
+
+    python -m studies.calibrate                      # the preset as it is frozen, beside the paper's row
+    python -m studies.calibrate --search             # find the islands for the preset's target again
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import tyro
+
+from guidance.validation import finite_number
+from hda.dtm_library import Ground, remove_tiles
+from hda.presets import PRESETS, find_preset, sample_scenario
+from hda.scenario import Preset
+from studies.ground_statistics import GroundStatistics, measure_ground
+from studies.monte_carlo import Study, local_processes, prepare_study, run_study
+from studies.paper import PAPER_ROWS
+from studies.rows import MEASURES
+
+
+@dataclass(frozen=True)
+class Search:
+    """What is searched for a preset.
+
+    Attributes:
+        target: [%] safe-landing percentage that Single Divert shall reach.
+        parameter: field of the terrain's `islands` that is swept.
+        values: values of the sweep, in order.
+        digits: decimals to which the interpolated value is rounded.
+    """
+
+    target: float
+    parameter: str
+    values: tuple[float, ...]
+    digits: int
+
+
+SEARCHES = {
+    "paper": Search(89.7, "smoothing_scale", (12.0, 16.0, 20.0, 24.0, 30.0, 40.0), digits=0),
+    "hard": Search(60.0, "threshold", (-0.8, -1.0, -1.2, -1.4, -1.6), digits=2),
+}
+"""The search that each preset was made by."""
+GROUND_EPISODES = 600
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """Command line of the calibration.
+
+    Attributes:
+        preset: which preset to calibrate or to show.
+        search: sweep the islands for the preset's target instead of showing the frozen preset.
+        control_periods: [s] control periods to sweep at the value found.
+        episodes: episodes for the final row.
+        sweep_episodes: episodes for each point of a sweep.
+        workers: processes.
+        out: folder for the tables.
+    """
+
+    preset: str = "paper"
+    search: bool = False
+    control_periods: Annotated[tuple[float, ...], tyro.conf.arg(metavar="S ...")] = (0.25, 0.5, 0.625, 1.0)
+    episodes: int = 6000
+    sweep_episodes: int = 2000
+    workers: int = 2
+    out: Path = Path("results/calibrate")
+
+
+@dataclass(frozen=True)
+class SingleDivertRow:
+    """Single Divert's mean measures on one setting.
+
+    Attributes:
+        label: what the setting is.
+        safe_percent: safe-landing percentage.
+        means: measure -> mean.
+    """
+
+    label: str
+    safe_percent: float
+    means: dict[str, float]
+
+
+def fly_single_divert(preset: Preset, episodes: int, workers: int, label: str) -> SingleDivertRow:
+    """Fly Single Divert over the tuning tiles of a setting; its terrain is kept only if a preset uses it."""
+    study = Study(preset, ("single-divert",), episodes, split="tuning")
+    prepare_study(study, workers)
+    with local_processes(workers) as executor:
+        rows = run_study(study, executor).rows
+    return SingleDivertRow(
+        label,
+        100.0 * float(np.mean([row.safe_site for row in rows])),
+        {name: float(np.mean([getattr(row, name) for row in rows])) for name in MEASURES},
+    )
+
+
+def with_islands(preset: Preset, parameter: str, value: float) -> Preset:
+    """The same setting with one field of the islands changed."""
+    islands = replace(preset.terrain.islands, **{parameter: value})
+    return replace(preset, terrain=replace(preset.terrain, islands=islands))
+
+
+def with_control_period(preset: Preset, period: float) -> Preset:
+    """The same setting with another control period."""
+    return replace(preset, rules=replace(preset.rules, control_period=period))
+
+
+def sweep_islands(preset: Preset, search: Search, options: Calibration) -> list[SingleDivertRow]:
+    """Fly Single Divert at each value of the sweep; terrain that no preset uses is removed again."""
+    kept = {Ground(p.terrain, p.criteria) for p in PRESETS.values()}
+    rows = []
+    for value in search.values:
+        setting = with_islands(preset, search.parameter, value)
+        label = f"{search.parameter} {value:g}"
+        rows.append(fly_single_divert(setting, options.sweep_episodes, options.workers, label))
+        ground = Ground(setting.terrain, setting.criteria)
+        if ground not in kept:
+            remove_tiles(ground)
+    return rows
+
+
+def interpolate_crossing(values: Sequence[float], safe_percent: Sequence[float], target: float) -> float:
+    """Value at which the safe percentage first passes `target`, linear between the points of a sweep.
+
+    Raises:
+        ValueError: the sweep does not bracket the target.
+    """
+    for k in range(len(values) - 1):
+        before, after = safe_percent[k] - target, safe_percent[k + 1] - target
+        if before * after <= 0.0 and before != after:
+            return values[k] + before / (before - after) * (values[k + 1] - values[k])
+    raise ValueError(f"values must bracket {target:g} % safe, got {list(safe_percent)} at {list(values)}")
+
+
+def describe_ground(preset: Preset, episodes: int = GROUND_EPISODES) -> dict[str, tuple[float, float, float]]:
+    """10, 50 and 90 % quantiles (and for the nearest safe ground 10, 50, 97 %) of the ground statistics."""
+    ground = [measure_ground(sample_scenario(preset, 0, k, "tuning")) for k in range(episodes)]
+
+    def quantiles(name: str, last: float = 0.9) -> tuple[float, float, float]:
+        values = [getattr(g, name) for g in ground]
+        low, middle, high = np.nanquantile(values, (0.1, 0.5, last))
+        return float(low), float(middle), float(high)
+
+    last = {"nearest_safe": 0.97}
+    return {name: quantiles(name, last.get(name, 0.9)) for name in GroundStatistics.__dataclass_fields__}
+
+
+def write_rows(path: Path, rows: Sequence[SingleDivertRow]) -> None:
+    """Write rows as CSV, the paper's first."""
+    paper = PAPER_ROWS["Single Divert"]
+    lines = ["setting,safe_percent," + ",".join(MEASURES)]
+    lines.append(f"paper,{paper['safe_site_percent']}," + ",".join(str(paper.get(m, "")) for m in MEASURES))
+    lines += [
+        f"{r.label},{r.safe_percent:.6g}," + ",".join(f"{r.means[m]:.6g}" for m in MEASURES) for r in rows
+    ]
+    path.write_text("\n".join(lines) + "\n")
+
+
+def print_rows(title: str, rows: Sequence[SingleDivertRow]) -> None:
+    """Print rows under the paper's."""
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(title=title)
+    for column in ("setting", "safe %", *MEASURES):
+        table.add_column(column, justify="left" if column == "setting" else "right")
+    paper = PAPER_ROWS["Single Divert"]
+    cells = (f"{paper[m]:g}" if m in paper else "" for m in MEASURES)
+    table.add_row("the paper", f"{paper['safe_site_percent']:g}", *cells, end_section=True)
+    for row in rows:
+        table.add_row(row.label, f"{row.safe_percent:.2f}", *(f"{row.means[m]:.4g}" for m in MEASURES))
+    Console(width=150).print(table)
+
+
+def calibrate(options: Calibration) -> SingleDivertRow:
+    """Run the calibration that the command line asks for; return the final row."""
+    finite_number("episodes", options.episodes, at_least=1)
+    finite_number("sweep_episodes", options.sweep_episodes, at_least=1)
+    preset = find_preset(options.preset)
+    options.out.mkdir(parents=True, exist_ok=True)
+    if options.search:
+        preset = search_islands(preset, options)
+    islands = preset.terrain.islands
+    label = f"islands {islands.smoothing_scale:g} m, {islands.threshold:g} sigma"
+    row = fly_single_divert(preset, options.episodes, options.workers, label)
+    print_rows(f"{preset.name}: single-divert on the tuning tiles, {options.episodes} episodes", [row])
+    write_rows(options.out / f"{preset.name}.csv", [row])
+    print_ground(preset)
+    return row
+
+
+def search_islands(preset: Preset, options: Calibration) -> Preset:
+    """Sweep the islands, print and write the sweep, and give the preset with the value that meets the target.
+
+    Raises:
+        ValueError: there is no search for this preset, or its sweep does not bracket the target.
+    """
+    if preset.name not in SEARCHES:
+        raise ValueError(f"preset must be one of {', '.join(SEARCHES)} to be searched, got {preset.name!r}")
+    search = SEARCHES[preset.name]
+    sweep = sweep_islands(preset, search, options)
+    print_rows(f"{preset.name}: islands, {options.sweep_episodes} episodes each", sweep)
+    crossing = interpolate_crossing(search.values, [row.safe_percent for row in sweep], search.target)
+    value = round(crossing, search.digits)
+    chosen = with_islands(preset, search.parameter, value)
+    periods = []
+    for period in options.control_periods:
+        setting = with_control_period(chosen, period)
+        label = f"control period {period:g} s"
+        periods.append(fly_single_divert(setting, options.sweep_episodes, options.workers, label))
+    print_rows(f"{preset.name}: control period at {search.parameter} {value:g}", periods)
+    write_rows(options.out / f"{preset.name}-sweep.csv", [*sweep, *periods])
+    return chosen
+
+
+def print_ground(preset: Preset) -> None:
+    """Print how safe ground lies around the first targets."""
+    from rich.console import Console
+
+    console = Console(width=150)
+    console.print(
+        f"ground within {preset.start.hazard_radius:g} m of the first target, {GROUND_EPISODES} episodes:"
+    )
+    for name, values in describe_ground(preset).items():
+        last = "97" if name == "nearest_safe" else "90"
+        console.print(f"  {name}: " + ", ".join(f"{v:.3g}" for v in values) + f" (10, 50, {last} %)")
+
+
+def main() -> None:
+    """Command line."""
+    calibrate(tyro.cli(Calibration, description=__doc__))
+
+
+if __name__ == "__main__":
+    main()
