@@ -10,7 +10,10 @@ from guidance.exports import lazy_exports
 if TYPE_CHECKING:
     from guidance.constants import MOON_GRAVITY, STANDARD_GRAVITY
     from guidance.dynamics import propagate
+    from guidance.errors import GuidanceError, InfeasibleError, SolverFailedError
     from guidance.lander import PAPER_LANDER, Lander
+    from guidance.pdg import solve_pdg
+    from guidance.plan import Plan, PlanStatus
     from guidance.state import State
     from guidance.zem_zev import saturate_thrust, time_to_go, zem_zev_acceleration
 
@@ -18,10 +21,16 @@ __all__ = [
     "MOON_GRAVITY",
     "PAPER_LANDER",
     "STANDARD_GRAVITY",
+    "GuidanceError",
+    "InfeasibleError",
     "Lander",
+    "Plan",
+    "PlanStatus",
+    "SolverFailedError",
     "State",
     "propagate",
     "saturate_thrust",
+    "solve_pdg",
     "time_to_go",
     "zem_zev_acceleration",
 ]
@@ -32,10 +41,16 @@ __getattr__, __dir__ = lazy_exports(
         "MOON_GRAVITY": "guidance.constants",
         "PAPER_LANDER": "guidance.lander",
         "STANDARD_GRAVITY": "guidance.constants",
+        "GuidanceError": "guidance.errors",
+        "InfeasibleError": "guidance.errors",
         "Lander": "guidance.lander",
+        "Plan": "guidance.plan",
+        "PlanStatus": "guidance.plan",
+        "SolverFailedError": "guidance.errors",
         "State": "guidance.state",
         "propagate": "guidance.dynamics",
         "saturate_thrust": "guidance.zem_zev",
+        "solve_pdg": "guidance.pdg",
         "time_to_go": "guidance.zem_zev",
         "zem_zev_acceleration": "guidance.zem_zev",
     },

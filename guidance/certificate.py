@@ -1,8 +1,8 @@
 """Proofs that no flight exists, checked by code that shares nothing with the solver but the rows themselves.
 
 A proof for one time of flight is a vector y in the dual cones with A'y = 0 and b'y < 0: a flight x would give
-0 <= y'(b - A x) = b'y < 0. Rounding leaves A'y small, not zero, so the check demands -b'y > |A'y|_1 X, where X
-bounds every unknown of any flight that keeps the thrust bounds and the dry mass.
+0 <= y'(b - A x) = b'y < 0. Rounding leaves A'y small, not zero, so the check demands -b'y > |A'y|_1 X, where
+X bounds every unknown of any flight that keeps the thrust bounds and the dry mass.
 """
 
 from __future__ import annotations

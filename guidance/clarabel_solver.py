@@ -1,11 +1,12 @@
 """One safe door to Clarabel: what its Python interface does not check is checked here.
 
-Clarabel reads a square CSR matrix as its transpose, panics (a BaseException) on some others, prints and ignores
-unknown keys of `update`, and ends in NumericalError on infinite data.
+Clarabel reads a square CSR matrix as its transpose, panics (a BaseException) on some others, prints and
+ignores unknown keys of `update`, and ends in NumericalError on infinite data.
 """
 
 from __future__ import annotations
 
+import importlib
 from dataclasses import dataclass
 from enum import Enum
 from typing import TYPE_CHECKING, Any
@@ -57,10 +58,14 @@ class ConicAnswer:
     words: str
 
 
+def _clarabel() -> Any:
+    """The extension module, which has no type stubs."""
+    return importlib.import_module("clarabel")
+
+
 def cone_list(cones: tuple[tuple[str, int], ...]) -> list[Any]:
     """Clarabel cone objects for ('zero' | 'nonnegative' | 'second_order', size) pairs."""
-    import clarabel
-
+    clarabel = _clarabel()
     makers = {
         "zero": clarabel.ZeroConeT,
         "nonnegative": clarabel.NonnegativeConeT,
@@ -70,7 +75,7 @@ def cone_list(cones: tuple[tuple[str, int], ...]) -> list[Any]:
 
 
 class ConicSolver:
-    """A Clarabel solver of fixed sparsity; every solve replaces all numbers, so none depends on an earlier one."""
+    """A Clarabel solver of fixed sparsity; every solve replaces all numbers: none depends on an earlier."""
 
     def __init__(
         self,
@@ -80,7 +85,9 @@ class ConicSolver:
         cones: tuple[tuple[str, int], ...],
         tolerance: float = 1e-8,
     ) -> None:
-        """Assemble from nominal numbers, and solve them once: a solver's first solve differs in its last bits.
+        """Assemble from nominal numbers, and solve them once.
+
+        The first solve of a Clarabel object differs from later ones in its last bits.
 
         Args:
             matrix: A, CSC, shape (m, n); every entry that may ever be nonzero is stored.
@@ -92,7 +99,6 @@ class ConicSolver:
         Raises:
             ValueError: the data do not fit together or are not finite.
         """
-        import clarabel
         from scipy.sparse import csc_matrix
 
         if matrix.format != "csc":
@@ -102,7 +108,8 @@ class ConicSolver:
         if matrix.shape != (bound.size, cost.size) or sum(size for _, size in cones) != bound.size:
             raise ValueError("matrix, bound, cost and cones do not fit together")
         self._shape = (matrix.nnz, bound.size, cost.size)
-        self._check(matrix.data, bound, cost)
+        self._check(np.asarray(matrix.data, dtype=np.float64), bound, cost)
+        clarabel = _clarabel()
         settings = clarabel.DefaultSettings()
         settings.verbose = False
         settings.presolve_enable = False  # removed rows would forbid updates
@@ -124,7 +131,9 @@ class ConicSolver:
     def solve(
         self, values: NDArray[np.float64], bound: NDArray[np.float64], cost: NDArray[np.float64]
     ) -> ConicAnswer:
-        """Solve with new numbers: the stored entries of A in CSC order, b and q. Raises nothing of the solver's.
+        """Solve with new numbers: the stored entries of A in CSC order, b and q.
+
+        No exception of the solver's comes through, panics included.
 
         Raises:
             ValueError: a number is not finite, or a shape is not the assembled one.

@@ -1,8 +1,8 @@
 """Constraint families of the convex problem: one function each, returning rows and cones.
 
-Every family states b - A x in a cone, in the units of `guidance.scaling`. Source of the formulation: Acikmese and
-Ploen, JGCD 30(5), 2007 (lossless convexification, log-mass); Blackmore, Acikmese and Scharf, JGCD 33(4), 2010
-(landing error); thrust acceleration is a first-order hold.
+Every family states b - A x in a cone, in the units of `guidance.scaling`. Source of the formulation:
+Acikmese and Ploen, JGCD 30(5), 2007 (lossless convexification, log-mass); Blackmore, Acikmese and Scharf,
+JGCD 33(4), 2010 (landing error); thrust acceleration is a first-order hold.
 """
 
 from __future__ import annotations
@@ -30,7 +30,8 @@ class Rows:
         column: its column.
         value: its value.
         bound: b.
-        value_power: p for each entry, where the entry goes with the time of flight as T^p; scalar or like value.
+        value_power: p for each entry, where the entry goes with the time of flight as T^p; scalar or like
+            value.
         bound_power: the same for b.
     """
 
@@ -45,13 +46,13 @@ class Rows:
     bound_power: Array = field(default_factory=lambda: np.zeros(1))
 
     def left_over(self, decision: Array) -> Array:
-        """b - A x, shape (cones, cone_size) (one cone for 'zero' and 'nonnegative')."""
+        """Slack b - A x, shape (cones, cone_size) (one cone for 'zero' and 'nonnegative')."""
         out = self.bound.copy()
         np.subtract.at(out, self.row, self.value * decision[self.column])
         return out.reshape(-1, self.cone_size)
 
     def violation(self, decision: Array) -> float:
-        """How far b - A x lies outside the cones; at most zero inside (for inequalities: minus the margin)."""
+        """How far b - A x lies outside the cones; inside an inequality: minus the margin."""
         rest = self.left_over(decision)
         if self.cone == "zero":
             return float(np.abs(rest).max())
@@ -78,7 +79,7 @@ def start(layout: Layout, scaled: ScaledProblem) -> Rows:
 
 
 def motion(layout: Layout, scaled: ScaledProblem) -> Rows:
-    """Exact motion between nodes under a thrust acceleration that is linear in time, and the burnt log-mass."""
+    """Exact motion between nodes under a thrust acceleration linear in time, and the burnt log-mass."""
     intervals = layout.nodes - 1
     h = 1.0 / intervals
     row = np.arange(intervals * 7).reshape(intervals, 7)

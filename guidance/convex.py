@@ -1,7 +1,8 @@
 """Least propellant (or least landing error) at a fixed time of flight, as a second-order cone programme.
 
-Assembled straight into Clarabel. One solver is built per (nodes, constraint set) from fixed nominal numbers and
-kept for the process; every solve replaces all numbers, so an answer has the same bits whatever was solved before.
+Assembled straight into Clarabel. One solver is built per (nodes, constraint set) from fixed nominal numbers
+and kept for the process; every solve replaces all numbers, so an answer has the same bits whatever was
+solved before.
 """
 
 from __future__ import annotations

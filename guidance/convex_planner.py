@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 from guidance.certificate import Certificate
 from guidance.convex import ConvexSolution
 from guidance.infeasibility import prove_fixed_time, prove_free_time
-from guidance.minimum_propellant import SHARE_TOLERANCE, ConvexTask, minimise_over_time
+from guidance.minimum_propellant import SHARE_TOLERANCE, ConvexTask, minimise_over_time, relaxation_tight
 from guidance.plan import Plan, PlanStatus
 from guidance.problem import LandingProblem
 
 METHOD = "convex"
 _OVERDRAFT = 1e-9  # in ln(mass): rounding of the solver
+_REPLAN_TOLERANCE = 1.5e-5  # in ln(mass), as SHARE_TOLERANCE: 18 g at 1200 kg
 _ERROR_TOLERANCE = 0.02  # [m] gain in landing error below which the time search stops
 _ERROR_SLACK = 0.05  # [m] landing error granted to the least-propellant step
 
@@ -38,7 +40,8 @@ def plan_convex(
     if time_of_flight is not None:
         solution, solves = task.solve(time_of_flight), 1
     else:
-        outcome = minimise_over_time(task, guess=guess_time, coarse_first=guess_time is None)
+        tolerance = SHARE_TOLERANCE if guess_time is None else _REPLAN_TOLERANCE
+        outcome = minimise_over_time(task, tolerance, guess_time, coarse_first=guess_time is None)
         solution, solves = outcome.solution, len(outcome.tried)
         if solution is None and outcome.window.empty:
             return Plan(PlanStatus.INFEASIBLE, problem, METHOD, message=outcome.window.cause)
@@ -48,7 +51,8 @@ def plan_convex(
 def _finish(task: ConvexTask, found: ConvexSolution | None, solves: int, status: PlanStatus) -> Plan:
     """Refine a solution until the true thrust bounds hold, check the tank, and make it a Plan."""
     problem = task.problem
-    none = Plan(PlanStatus.INFEASIBLE, problem, METHOD, message="no feasible time of flight found", solves=solves)
+    message = "no feasible time of flight found"
+    none = Plan(PlanStatus.INFEASIBLE, problem, METHOD, message=message, solves=solves)
     if found is None:
         return none
     if not found.solved:
@@ -59,20 +63,13 @@ def _finish(task: ConvexTask, found: ConvexSolution | None, solves: int, status:
     if not solution.solved or solution.propellant_share > problem.log_mass_ratio + _OVERDRAFT:
         words = "feasible only with thrust bounds relaxed outward: on the edge of what the lander can do"
         return replace(none, status=PlanStatus.LIMIT_REACHED, message=words)
-    return Plan(
-        status,
-        problem,
-        METHOD,
-        landing_error=solution.landing_error,
-        message=status.value,
-        solves=solves,
-        **solution.trajectory(problem),
-    )
+    if not relaxation_tight(problem, solution):
+        words = "the relaxed optimum thrusts below min_thrust: no flight with true thrust bounds was found"
+        return replace(none, status=PlanStatus.LIMIT_REACHED, message=words)
+    return Plan.of_flight(status, problem, METHOD, solution.trajectory(problem), solves)
 
 
 def _shortage(problem: LandingProblem, solution: ConvexSolution) -> str:
-    import math
-
     needed = problem.state.mass * -math.expm1(-solution.propellant_share)
     return (
         f"propellant: the cheapest flight found needs {needed:.2f} kg, "
@@ -93,9 +90,9 @@ def prove_infeasible(
 def plan_nearest(problem: LandingProblem, nodes: int, time_of_flight: float | None = None) -> Plan:
     """Land softly as near to the target as possible, in its plane, then with the least propellant.
 
-    Three convex problems: the cheapest soft landing anywhere (which tells whether there is one), the least landing
-    error with the propellant on board, the least propellant to within that error (Blackmore, Acikmese and Scharf,
-    JGCD 33(4), 2010, "prioritized" scheme).
+    Three convex problems: the cheapest soft landing anywhere (which tells whether there is one), the least
+    landing error with the propellant on board, the least propellant to within that error (Blackmore,
+    Acikmese and Scharf, JGCD 33(4), 2010, "prioritized" scheme).
 
     Returns:
         A plan that is NEAREST, or one without a flight (no soft landing anywhere was found).

@@ -1,23 +1,23 @@
 """Search for the flight time of least cost, led by the derivative of the optimum.
 
-The cost J(T) of the fixed-time problem falls steeply where T is short, and rises where T is long with a slope that
-nears a = |g|/exhaust velocity, the price of hovering. J' = a - b/(T - c)^2 describes both, so the search is a
-secant (with three samples an inverse parabola) of T over w = (a - J')^(-1/2), in which the model is a straight
-line. J' comes from the dual solution and costs nothing. Where this stalls, the bracket is halved on the sign of J'.
+The cost J(T) of the fixed-time problem falls steeply where T is short, and rises where T is long with a
+slope that nears a = |g|/exhaust velocity, the price of hovering. J' = a - b/(T - c)^2 describes both, so the
+search is a secant (with three samples an inverse parabola) of T over w = (a - J')^(-1/2), in which the model
+is a straight line. J' comes from the dual solution and costs nothing. Where this stalls, the bracket is
+halved on the sign of J'.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Generic, Protocol, TypeVar
 
 from guidance.time_window import TimeWindow
 
 _STRETCH = 1.7  # greatest change of the time in one unbracketed step
 _BLIND_STEP = 1.25  # change of the time where nothing is known of the curvature
-_DEAD_TIME = 0.75  # c/T of a typical descent, for the first step
 _MOST_STEPS = 40
 
 
@@ -55,10 +55,13 @@ class TimeModel:
     Attributes:
         asymptote: a, or zero if unknown: then J' itself takes the place of w.
         pace: dT/dw, as found by an earlier search; zero if unknown.
+        dead_time: c/T for the first step, where `pace` is unknown: 0.75 suits a typical descent; nearer to
+            one, the step is smaller.
     """
 
     asymptote: float
     pace: float = 0.0
+    dead_time: float = 0.75
 
     def warp(self, slope: float) -> float:
         """w, in which T is nearly linear."""
@@ -73,7 +76,7 @@ class TimeModel:
             return sample.time + self.pace * (goal - here)
         if self.asymptote <= 0.0:
             return sample.time * (_BLIND_STEP if sample.slope < 0.0 else 1.0 / _BLIND_STEP)
-        return sample.time * (1.0 + (1.0 - _DEAD_TIME) * (goal / here - 1.0))
+        return sample.time * (1.0 + (1.0 - self.dead_time) * (goal / here - 1.0))
 
 
 class TimeSearch(Generic[Solution]):
@@ -118,7 +121,7 @@ class TimeSearch(Generic[Solution]):
         return solution
 
     def run(self, guess: float) -> Solution | None:
-        """The cheapest solution found; None if every time tried, a grid over the window included, is infeasible."""
+        """The cheapest solution found; None if every time tried, a grid over the window included, fails."""
         latest = self.sample(guess)
         if not latest.solved:
             found = self._probe(guess)
@@ -173,7 +176,7 @@ class TimeSearch(Generic[Solution]):
                     return _tangents_cross(*pair)[0]
             gap = self.model.warp(pair[1].slope) - self.model.warp(pair[0].slope)
             pace = (pair[1].time - pair[0].time) / gap if gap > 0.0 else 0.0  # zero where J is concave
-            self.model = TimeModel(self.model.asymptote, pace)
+            self.model = replace(self.model, pace=pace)
             goal = self._parabola(feasible)
             if falling and rising and goal is not None and pair[0].time < goal < pair[1].time:
                 return goal
@@ -197,12 +200,12 @@ class TimeSearch(Generic[Solution]):
         ) / gaps
 
     def _stalled(self) -> bool:
-        """Whether the last two samples fell on one side of the optimum: the cost has a kink, tangents are better."""
+        """Whether the last two samples fell on one side of the optimum: at a kink, tangents are better."""
         last = [s.slope < 0.0 for s in self.samples[-3:] if s.solved]
         return len(last) == 3 and last[-1] == last[-2]
 
     def _closed(self) -> bool:
-        """Whether the tangents of the samples next to the optimum leave nothing to gain (J convex between)."""
+        """Whether the tangents at the samples next to the optimum leave nothing to gain (J convex)."""
         falling = [s for s in self.samples if s.solved and s.slope < 0.0]
         rising = [s for s in self.samples if s.solved and s.slope >= 0.0]
         if self.best is None or not falling or not rising:

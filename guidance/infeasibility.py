@@ -17,9 +17,9 @@ from guidance.time_window import time_window
 def prove_at(task: ConvexTask, time: float) -> FarkasProof | ConvexSolution:
     """Proof that no flight lasts `time`, or the solution that kept it from being found.
 
-    The thrust bounds are relaxed outward. Where the relaxed problem is infeasible the solver's own certificate is
-    the proof. Where it is feasible, but its cheapest flight overdraws the tank, the dual solution y of
-    "propellant >= y-bound" becomes a proof by giving the tank's row the multiplier one.
+    The thrust bounds are relaxed outward. Where the relaxed problem is infeasible the solver's own
+    certificate is the proof. Where it is feasible, but its cheapest flight overdraws the tank, the dual
+    solution y of "propellant >= y-bound" becomes a proof by giving the tank's row the multiplier one.
     """
     cheapest = replace(task, least_error=False, limit_propellant=False)
     solution = cheapest.solve(time)
@@ -44,20 +44,22 @@ def prove_fixed_time(task: ConvexTask, time: float) -> Certificate | None:
     proof = prove_at(task, time)
     if not isinstance(proof, FarkasProof):
         return None
-    scope = f"time of flight {time:g} s, {task.nodes} nodes, thrust bounds relaxed outward: a verified Farkas proof"
+    scope = (
+        f"time of flight {time:g} s, {task.nodes} nodes, thrust bounds relaxed outward: verified Farkas proof"
+    )
     return Certificate(scope, proof.causes, (proof,))
 
 
 def prove_free_time(task: ConvexTask, also: tuple[float, ...] = ()) -> Certificate | ConvexSolution | None:
-    """Certificate for a free time of flight: closed-form bounds outside a window, Farkas proofs on a grid inside.
+    """Certificate for a free time of flight: closed-form bounds outside a window, Farkas proofs inside.
 
     Args:
         task: what was to be solved.
         also: [s] further times to prove, such as the best one found.
 
     Returns:
-        The certificate; or a solution, where a time on the grid turns out to be feasible; or None, where a proof
-        could not be verified.
+        The certificate; or a solution, where a time on the grid turns out to be feasible; or None, where a
+        proof could not be verified.
     """
     window = time_window(task.problem, task.free_landing_point)
     if window.empty:
@@ -75,7 +77,7 @@ def prove_free_time(task: ConvexTask, also: tuple[float, ...] = ()) -> Certifica
         return None
     causes = tuple(dict.fromkeys(cause for proof in proofs for cause in proof.causes))
     scope = (
-        f"{len(proofs)} times of flight from {window.low:.3g} to {window.high:.3g} s, {task.nodes} nodes, thrust "
-        "bounds relaxed outward: verified Farkas proofs; all times outside: closed-form bounds"
+        f"{len(proofs)} times of flight from {window.low:.3g} to {window.high:.3g} s, {task.nodes} nodes, "
+        "thrust bounds relaxed outward: verified Farkas proofs; all times outside: closed-form bounds"
     )
     return Certificate(scope, causes, tuple(proofs))

@@ -18,8 +18,8 @@ class Layout:
 
     Attributes:
         nodes: N, at least 3; there are N - 1 intervals.
-        free_landing_point: whether the vector ends with one more number, the landing error, because the landing
-            point may move in the target plane.
+        free_landing_point: whether the vector ends with one more number, the landing error, because the
+            landing point may move in the target plane.
     """
 
     nodes: int

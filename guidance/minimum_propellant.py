@@ -1,4 +1,4 @@
-"""Convex planning: one fixed-time task refined until the true thrust bounds hold, and the best time of flight."""
+"""One fixed-time task refined until the true thrust bounds hold, and the best time of flight."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ Array = NDArray[np.float64]
 
 _THRUST_TOLERANCE = 5e-4  # relative; half of what a plan promises
 _COARSE_NODES = 16
+_NEAR_DEAD_TIME = 0.97  # first steps are small where the guess is good
 _MOST_REFINEMENTS = 8
 SHARE_TOLERANCE = 4e-6
 """Gain in ln(mass) below which the time search stops: 5 g of propellant at 1200 kg."""
@@ -45,7 +46,7 @@ class ConvexTask:
     tolerance: float = 1e-8
 
     def solve(self, time: float, log_mass: Array | None = None) -> ConvexSolution:
-        """One conic solve; thrust bounds linearised at `log_mass` (any length), or relaxed outward if None."""
+        """One conic solve; thrust bounds linearised at `log_mass` (any length), or outward if None."""
         if log_mass is not None and log_mass.size != self.nodes:
             shares = np.linspace(0.0, 1.0, log_mass.size)
             log_mass = np.interp(np.linspace(0.0, 1.0, self.nodes), shares, log_mass)
@@ -86,6 +87,18 @@ def bounds_hold(problem: LandingProblem, solution: ConvexSolution, reference: Ar
     return 0.5 * float(np.max((log_mass - reference) ** 2)) < _THRUST_TOLERANCE
 
 
+def relaxation_tight(problem: LandingProblem, solution: ConvexSolution) -> bool:
+    """Whether the thrust itself, not only its slack, stays above min_thrust to 0.1 %.
+
+    It does wherever the convexification is lossless; it may not where the time of flight is fixed and too
+    long.
+    """
+    push = np.linalg.norm(solution.answer.primal[solution.layout.acceleration], axis=1)
+    thrust = push * np.exp(solution.log_mass)
+    ratio = problem.lander.min_thrust / problem.lander.max_thrust
+    return bool(thrust.min() >= ratio * (1.0 - 2.0 * _THRUST_TOLERANCE))
+
+
 @dataclass(frozen=True, eq=False)
 class TimeOutcome:
     """What a search over the time of flight found.
@@ -116,8 +129,8 @@ def minimise_over_time(
 ) -> TimeOutcome:
     """Search the time of flight of least cost.
 
-    The time, the thrust bounds' linearisation and the curvature of the cost come from a search on a coarse mesh
-    first, so that one or two solves are left for the fine one.
+    The time, the thrust bounds' linearisation and the curvature of the cost come from a search on a coarse
+    mesh first, so that one or two solves are left for the fine one.
 
     Args:
         task: what is solved at each time.
@@ -128,7 +141,7 @@ def minimise_over_time(
     window = time_window(task.problem, task.free_landing_point)
     if window.empty:
         return TimeOutcome(None, window, [])
-    model = TimeModel(_asymptote(task))
+    model = TimeModel(_asymptote(task), dead_time=0.75 if coarse_first else _NEAR_DEAD_TIME)
     reference: Array | None = None
     start = guess_time(task.problem, window) if guess is None else guess
     start = min(max(start, window.low), window.high)

@@ -1,6 +1,6 @@
 """Powered-descent guidance: `solve_pdg`, the public entry to every solver.
 
-    python -m guidance.pdg --state 200 100 950 -8 -4 -30 1200 --target 0 0 50 --plot plan.png
+python -m guidance.pdg --state 200 100 950 -8 -4 -30 1200 --target 0 0 50 --plot plan.png
 """
 
 from __future__ import annotations
@@ -56,8 +56,8 @@ def solve_pdg(
         nodes: N; the plan has N - 1 intervals of equal duration.
         method: 'convex' (lossless convexification in Clarabel; fast), 'cvxpy' (the same problem, written for
             reading) or 'casadi' (the unrelaxed nonconvex problem by IPOPT).
-        unreachable: what to do where the target is out of reach: 'raise', or plan to the softly reachable point
-            'nearest' to it in its plane (always by the convex method).
+        unreachable: what to do where the target is out of reach: 'raise', or plan to the softly reachable
+            point 'nearest' to it in its plane (always by the convex method).
         guess: an earlier Plan of nearly the same flight: what is left of it seeds the search.
         throw: raise where there is no flight; otherwise return a Plan that says why.
 
@@ -127,11 +127,18 @@ def _plan(
         return plan_cvxpy(problem, nodes, time_of_flight)
     from guidance.reference_casadi import plan_casadi
 
-    return plan_casadi(problem, nodes, time_of_flight, guess)
+    plan = plan_casadi(problem, nodes, time_of_flight, guess)
+    if plan.status in (PlanStatus.SOLVER_FAILED, PlanStatus.LIMIT_REACHED):
+        from guidance.convex_planner import plan_convex
+
+        convex = plan_convex(problem, nodes, time_of_flight)
+        if convex.status.has_flight:  # the case is feasible: the local solver had a poor start
+            return plan_casadi(problem, nodes, time_of_flight, convex)
+    return plan
 
 
 def _without_flight(plan: Plan, nodes: int, time_of_flight: float | None, unreachable: str) -> Plan:
-    """Tell infeasible from failed by the convex problem's certificate, or fly to the nearest reachable point."""
+    """Tell infeasible from failed by a certificate, or fly to the nearest reachable point."""
     from guidance.convex_planner import plan_convex, plan_nearest, prove_infeasible
 
     problem, anywhere = plan.problem, False
@@ -145,7 +152,8 @@ def _without_flight(plan: Plan, nodes: int, time_of_flight: float | None, unreac
     proof = prove_infeasible(problem, nodes, time_of_flight, anywhere)
     if isinstance(proof, Certificate):
         limits = ", ".join(proof.causes)
-        message = plan.message if plan.message.startswith("propellant") else f"{plan.message} (limits: {limits})"
+        told = plan.message.startswith("propellant")
+        message = plan.message if told else f"{plan.message} (limits: {limits})"
         return replace(plan, status=PlanStatus.INFEASIBLE, certificate=proof, message=message)
     if plan.method == "convex" and proof is not None and time_of_flight is None and not anywhere:
         retry = plan_convex(problem, nodes, None, proof.time)
@@ -155,3 +163,9 @@ def _without_flight(plan: Plan, nodes: int, time_of_flight: float | None, unreac
         message = f"{plan.message}; infeasibility could not be proved"
         return replace(plan, status=PlanStatus.LIMIT_REACHED, message=message)
     return plan
+
+
+if __name__ == "__main__":
+    from guidance.pdg_command import main
+
+    main()

@@ -51,8 +51,8 @@ def _no_vectors() -> Array:
 class Plan:
     """A descent on N nodes (N - 1 intervals), in SI and the site frame.
 
-    Between nodes the thrust *acceleration* is linear in time (first-order hold). Arrays are read-only, and empty
-    where the status has no flight.
+    Between nodes the thrust *acceleration* is linear in time (first-order hold). Arrays are read-only, and
+    empty where the status has no flight.
 
     Attributes:
         status: how planning ended.
@@ -86,6 +86,31 @@ class Plan:
         """Freeze the arrays."""
         for name in ("time", "position", "velocity", "mass", "thrust"):
             getattr(self, name).flags.writeable = False
+
+    @classmethod
+    def of_flight(
+        cls,
+        status: PlanStatus,
+        problem: LandingProblem,
+        method: str,
+        flight: dict[str, Array],
+        solves: int = 0,
+    ) -> Plan:
+        """A plan with a flight: `flight` holds time, position, velocity, mass and thrust by name."""
+        miss = float(np.linalg.norm(flight["position"][-1, :2] - problem.target[:2]))
+        return cls(
+            status,
+            problem,
+            method,
+            flight["time"],
+            flight["position"],
+            flight["velocity"],
+            flight["mass"],
+            flight["thrust"],
+            miss,
+            message=status.value,
+            solves=solves,
+        )
 
     @property
     def time_of_flight(self) -> float:
@@ -139,7 +164,7 @@ class Plan:
         return np.linalg.norm(self._acceleration, axis=1) / self.problem.lander.exhaust_velocity
 
     def _mass_between(self, k: NDArray[np.int64], share: Array) -> Array:
-        """Mass inside interval k: its logarithm is quadratic where the magnitude of acceleration is linear."""
+        """Mass in interval k: its logarithm is quadratic where the magnitude of acceleration is linear."""
         bend = 0.5 * self.time[1] * (self._flow[k + 1] - self._flow[k]) * share * (1.0 - share)
         return self.mass[k] * (self.mass[k + 1] / self.mass[k]) ** share * np.exp(bend)
 

@@ -22,8 +22,8 @@ class LandingProblem:
         target: [m] shape (3,), site frame.
         lander: the vehicle; its pointing limit is measured from the z axis.
         gravity: [m/s^2] shape (3,), constant.
-        glide_slope_limit: [rad] greatest angle, seen from the landing point, between the vehicle and the z axis,
-            in (0, pi/2]; None for none.
+        glide_slope_limit: [rad] greatest angle, seen from the landing point, between the vehicle and the z
+            axis, in (0, pi/2]; None for none.
         speed_limit: [m/s] greatest speed; None for none.
 
     Raises:

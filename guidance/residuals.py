@@ -28,7 +28,8 @@ class Residuals:
         landing_position: [m] flown landing point from the planned one.
         landing_velocity: [m/s] flown speed at the end.
         thrust_above: [N] greatest excess over max_thrust, at nodes and between.
-        thrust_below: [N] greatest lack below min_thrust at nodes (between them a change of direction may dip).
+        thrust_below: [N] greatest lack below min_thrust at nodes (between them a change of direction may
+            dip).
         pointing: [rad] greatest excess over the pointing limit at nodes.
         glide_slope: [m] greatest horizontal distance outside the glide slope cone, flown, at nodes.
         altitude: [m] greatest depth below the target's altitude, flown, at nodes and between.

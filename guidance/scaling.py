@@ -1,9 +1,9 @@
 """Non-dimensional numbers of the convex problem.
 
-Units of one solve: the time of flight T, the acceleration a = max_thrust / start mass, hence a T for velocity and
-a T^2 for length; origin at the target. The logarithm of m / m_start is measured in units of
-kappa = a T / exhaust velocity, so that its rate is minus the slack. Then the equations of motion hold the same
-numbers at every solve. In raw SI the solver says "Solved" and is a percent of the propellant wrong.
+Units of one solve: the time of flight T, the acceleration a = max_thrust / start mass, hence a T for
+velocity and a T^2 for length; origin at the target. The logarithm of m / m_start is measured in units of
+kappa = a T / exhaust velocity, so that its rate is minus the slack. Then the equations of motion hold the
+same numbers at every solve. In raw SI the solver says "Solved" and is a percent of the propellant wrong.
 """
 
 from __future__ import annotations
@@ -91,8 +91,8 @@ class ScaledProblem:
 def least_log_mass(problem: LandingProblem, time: float, nodes: int) -> Array:
     """Lower bound on ln(m / m_start) at each node, shape (N,): full thrust throughout, and the dry mass.
 
-    Guarded where full thrust would burn the whole vehicle: there the dry mass is the bound. The 2 % covers the
-    trapezoidal rule of the mass equation, which burns a little more than the continuous engine can.
+    Guarded where full thrust would burn the whole vehicle: there the dry mass is the bound. The 2 % covers
+    the trapezoidal rule of the mass equation, which burns a little more than the continuous engine can.
     """
     elapsed = np.linspace(0.0, time, nodes)
     left = 1.0 - problem.lander.max_mass_flow / problem.state.mass * elapsed
@@ -117,9 +117,10 @@ def outer_mass_bounds(problem: LandingProblem, time: float, kappa: float, nodes:
 
 
 def tangent_mass_bounds(problem: LandingProblem, log_mass: Array, kappa: float) -> MassBounds:
-    """Thrust bounds linearised at a log-mass history ln(m / m_start), shape (N,): exact where the mass equals it.
+    """Thrust bounds linearised at a log-mass history ln(m / m_start), shape (N,).
 
-    The upper bound is an inner one everywhere (a tangent lies below the convex curve).
+    They are exact where the mass equals it. The upper bound is an inner one everywhere: a tangent lies below
+    the convex curve.
     """
     touch = np.exp(-log_mass)
     ratio = problem.lander.min_thrust / problem.lander.max_thrust
@@ -143,8 +144,9 @@ def scale_problem(
         nodes: N.
         log_mass: reference ln(m / m_start) for the thrust bounds, shape (N,); None for the outer relaxation.
         error_limit: [m] greatest landing error; None for no limit that could bind.
-        limit_propellant: whether the dry mass bounds the flight. A least-propellant flight needs no such bound
-            (it has the propellant or no flight has), and without it every time of flight can be compared.
+        limit_propellant: whether the dry mass bounds the flight. A least-propellant flight needs no such
+            bound (it has the propellant or no flight has), and without it every time of flight can be
+            compared.
 
     Returns:
         The scaled problem.

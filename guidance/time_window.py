@@ -33,7 +33,7 @@ class TimeWindow:
         return self.high < self.low
 
     def grid(self) -> Array:
-        """Times from end to end in geometric progression: 6 % apart, but at least 4 and at most 24 of them."""
+        """Times from end to end in geometric progression: 6 % apart, at least 4 and at most 24."""
         count = math.ceil(math.log(self.high / self.low) / math.log(1.06)) + 1
         return np.geomspace(self.low, self.high, min(max(count, 4), 24))
 
@@ -50,8 +50,8 @@ def _square(*coefficients: Array) -> Array:
 def _necessary(problem: LandingProblem, free_landing_point: bool) -> dict[str, list[Array]]:
     """Polynomials in T (rising powers) that are >= 0 at every feasible time, by the limit they stem from.
 
-    With the thrust acceleration u: int u = -(v + g T), int (T-t) u = R - v T - g T^2/2, int t u = -R - g T^2/2,
-    while |u| <= max_thrust/dry_mass and int |u| <= exhaust_velocity ln(m/m_dry).
+    With the thrust acceleration u: int u = -(v + g T), int (T-t) u = R - v T - g T^2/2, int t u = -R - g
+    T^2/2, while |u| <= max_thrust/dry_mass and int |u| <= exhaust_velocity ln(m/m_dry).
     """
     push = problem.lander.max_thrust / problem.lander.dry_mass
     supply = problem.lander.exhaust_velocity * problem.log_mass_ratio
@@ -92,8 +92,8 @@ def _hull(polynomials: list[Array], low: float, high: float) -> tuple[float, flo
 def time_window(problem: LandingProblem, free_landing_point: bool = False) -> TimeWindow:
     """Closed-form bounds on the time of flight.
 
-    Where nothing bounds it from above (no gravity, no least thrust) the window ends at a hundred times the time
-    that the engine needs to stop and to cross the distance.
+    Where nothing bounds it from above (no gravity, no least thrust) the window ends at a hundred times the
+    time that the engine needs to stop and to cross the distance.
 
     Args:
         problem: the landing problem.
