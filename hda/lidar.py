@@ -60,7 +60,7 @@ def _look_into(
     sensor: tuple[float, float, float],
     out: NDArray[np.float32],
 ) -> None:
-    """Fill `out` with the observed map; `sensor` is (width m, noise per metre, tan of the off-nadir limit)."""
+    """Fill `out` with the observed map; `sensor` is (width, noise per metre, tan off-nadir limit)."""
     width, noise_per_metre, limit = sensor
     rows, columns = probability.shape
     n = out.shape[0]

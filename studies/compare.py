@@ -1,0 +1,161 @@
+"""Fly policies over the same episodes and print the table that compares them.
+
+Every policy meets the same ground, starts, map noise and thrust errors. Beside each ratio stands Wilson's
+interval and, in brackets, the interval clustered by tile; p is the exact McNemar test of safe landings
+against single-divert; means carry bootstrap intervals. Privileged policies see the true map.
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from guidance.validation import finite_number
+from hda.presets import find_preset
+from hda.registry import policy_entry, policy_names
+from studies.monte_carlo import Study, StudyResult, local_processes, prepare_study, run_study
+from studies.provenance import write_provenance
+from studies.rows import EpisodeRow
+from studies.table import (
+    REFERENCE_POLICY,
+    PolicySummary,
+    print_table,
+    summarize_policy,
+    write_episodes,
+    write_table,
+    write_timings,
+)
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Command line of the comparison.
+
+    Attributes:
+        episodes: episodes per policy, at least 1.
+        policies: names of policies, or `all`.
+        preset: the setting: paper or hard.
+        study_seed: seed of the study; equal seeds give equal episodes.csv and table.csv.
+        split: tile split: validation or fresh to evaluate, tuning for choices.
+        workers: processes; changes nothing but the time.
+        out: folder for results; results/PRESET by default.
+        figures: draw the histograms and trajectories.
+    """
+
+    episodes: int = 1000
+    policies: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME ...")] = ("all",)
+    preset: str = "paper"
+    study_seed: int = 0
+    split: str = "validation"
+    workers: int = 2
+    out: Path | None = None
+    figures: bool = True
+
+
+def plan_study(options: Comparison) -> Study:
+    """Check the options and make the study: policies in the order of the registry, each once.
+
+    Raises:
+        ValueError: an option is out of range or names something unknown.
+    """
+    for name in ("episodes", "workers"):
+        finite_number(name, getattr(options, name), at_least=1)
+    finite_number("study_seed", options.study_seed, at_least=0)
+    wanted = set(policy_names() if "all" in options.policies else options.policies)
+    for name in options.policies:
+        if name != "all":
+            policy_entry(name)
+    if not wanted:
+        raise ValueError("policies must name at least one policy")
+    ordered = tuple(name for name in policy_names() if name in wanted)
+    return Study(find_preset(options.preset), ordered, options.episodes, options.study_seed, options.split)
+
+
+def open_folder(out: Path) -> Path:
+    """Make the results folder and write a file in it, before any episode is flown.
+
+    Raises:
+        OSError: the folder cannot be made or written.
+    """
+    out.mkdir(parents=True, exist_ok=True)
+    probe = out / ".writable"
+    probe.write_text("")
+    probe.unlink()
+    return out
+
+
+def with_reference(study: Study) -> Study:
+    """The study with the reference policy in it, so that a policy's line never depends on the others."""
+    missing = REFERENCE_POLICY not in study.policies
+    return replace(study, policies=(*study.policies, REFERENCE_POLICY)) if missing else study
+
+
+def fly_with_progress(study: Study, workers: int) -> StudyResult:
+    """Fly a study on local processes under a progress bar."""
+    prepare_study(study, workers)
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, transient=True) as progress, local_processes(workers) as executor:
+        task = progress.add_task("episodes", total=study.episodes * len(study.policies))
+        return run_study(study, executor, lambda count: progress.advance(task, count))
+
+
+def summarize_study(study: Study, rows: tuple[EpisodeRow, ...]) -> list[PolicySummary]:
+    """Score every policy of the study; `rows` must hold the reference policy too."""
+    by_policy: dict[str, list[EpisodeRow]] = {}
+    for row in rows:
+        by_policy.setdefault(row.policy, []).append(row)
+    return [
+        summarize_policy(
+            by_policy[name],
+            by_policy[REFERENCE_POLICY],
+            study.preset.name,
+            study.study_seed,
+            policy_entry(name).privileged,
+        )
+        for name in study.policies
+    ]
+
+
+def compare(options: Comparison) -> list[PolicySummary]:
+    """Fly the comparison and write its folder: tables, provenance, figures, trajectories.
+
+    Raises:
+        ValueError: an option is out of range or names something unknown.
+        OSError: the folder cannot be written.
+    """
+    study = plan_study(options)
+    out = open_folder(options.out or Path("results") / study.preset.name)
+    flown = fly_with_progress(with_reference(study), options.workers)
+    rows = tuple(row for row in flown.rows if row.policy in study.policies)
+    summaries = summarize_study(study, flown.rows)
+    write_episodes(out, rows)
+    write_table(out / "table.csv", summaries)
+    write_timings(out / "timings.csv", {name: flown.decision_time[name] for name in study.policies})
+    write_provenance(out / "provenance.json", study)
+    if options.figures:
+        from studies.figures import draw_figures
+
+        draw_figures(out, study, rows)
+    print_table(summaries)
+    Console().print(f"results in {out}")
+    return summaries
+
+
+def main() -> None:
+    """Command line; a wrong option is one line on stderr and exit code 2."""
+    options = tyro.cli(Comparison, description=__doc__)
+    try:
+        compare(options)
+    except (ValueError, OSError) as error:
+        Console(stderr=True).print(f"error: {error}", style="red", markup=False, highlight=False)
+        sys.exit(2)
+
+
+if __name__ == "__main__":
+    main()

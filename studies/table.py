@@ -1,0 +1,190 @@
+"""The table of a study: one line per policy, every figure with its interval."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from studies.paper import PAPER_ROWS
+from studies.rows import MEASURES, ROW_COLUMNS, EpisodeRow
+from studies.statistics import (
+    Interval,
+    bootstrap_mean,
+    clustered_interval,
+    mcnemar_p_value,
+    wilson_interval,
+)
+
+REFERENCE_POLICY = "single-divert"
+"""Every policy is compared with this one, on the same episodes."""
+
+
+@dataclass(frozen=True)
+class PolicySummary:
+    """One line of the table.
+
+    Attributes:
+        policy: name.
+        preset: name of the setting.
+        episodes: number of episodes.
+        safe_site: ratio of safe touchdown cells with Wilson's interval.
+        safe_site_by_tile: the same ratio with the interval clustered by tile.
+        success: ratio of successes with Wilson's interval.
+        success_by_tile: the same ratio with the interval clustered by tile.
+        mcnemar_p: exact McNemar test of `safe_site` against the reference policy; nan for itself.
+        means: measure -> mean with its bootstrap interval.
+        fallbacks: decisions in which the policy's own law gave no answer.
+        privileged: it sees the true map.
+    """
+
+    policy: str
+    preset: str
+    episodes: int
+    safe_site: Interval
+    safe_site_by_tile: Interval
+    success: Interval
+    success_by_tile: Interval
+    mcnemar_p: float
+    means: dict[str, Interval]
+    fallbacks: int
+    privileged: bool
+
+
+def summarize_policy(
+    rows: Sequence[EpisodeRow],
+    reference: Sequence[EpisodeRow],
+    preset: str,
+    study_seed: int,
+    privileged: bool,
+) -> PolicySummary:
+    """Score the rows of one policy against the reference policy's rows of the same episodes.
+
+    Raises:
+        ValueError: the episodes of the two differ.
+    """
+    if [row.episode for row in rows] != [row.episode for row in reference]:
+        raise ValueError("rows and reference must hold the same episodes in the same order")
+    safe = np.array([row.safe_site for row in rows])
+    success = np.array([row.success for row in rows])
+    tiles = np.array([row.tile for row in rows])
+    itself = rows[0].policy == reference[0].policy
+    means = {
+        name: bootstrap_mean(
+            np.array([getattr(row, name) for row in rows]), np.random.default_rng([study_seed, k])
+        )
+        for k, name in enumerate(MEASURES)
+    }
+    return PolicySummary(
+        policy=rows[0].policy,
+        preset=preset,
+        episodes=len(rows),
+        safe_site=wilson_interval(int(safe.sum()), safe.size),
+        safe_site_by_tile=clustered_interval(safe, tiles),
+        success=wilson_interval(int(success.sum()), success.size),
+        success_by_tile=clustered_interval(success, tiles),
+        mcnemar_p=float("nan")
+        if itself
+        else mcnemar_p_value(safe, np.array([row.safe_site for row in reference])),
+        means=means,
+        fallbacks=sum(row.fallbacks for row in rows),
+        privileged=privileged,
+    )
+
+
+def _number(value: float) -> str:
+    return "" if np.isnan(value) else f"{value:.9g}"
+
+
+def _percent(interval: Interval) -> list[str]:
+    return [_number(100.0 * value) for value in (interval.estimate, interval.low, interval.high)]
+
+
+def write_table(path: Path, summaries: Sequence[PolicySummary]) -> None:
+    """Write the table as CSV; equal summaries give equal bytes."""
+    header = ["policy", "preset", "episodes"]
+    header += ["safe_site_percent", "safe_site_low", "safe_site_high"]
+    header += ["success_percent", "success_low", "success_high", "mcnemar_p"]
+    header += [f"{name}{end}" for name in MEASURES for end in ("", "_low", "_high")]
+    header += ["fallbacks", "privileged"]
+    header += [f"{name}_tile_{end}" for name in ("safe_site", "success") for end in ("low", "high")]
+    with path.open("w", newline="") as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(header)
+        for s in summaries:
+            cells = [s.policy, s.preset, s.episodes, *_percent(s.safe_site), *_percent(s.success)]
+            cells.append(_number(s.mcnemar_p))
+            for name in MEASURES:
+                mean = s.means[name]
+                cells += [_number(value) for value in (mean.estimate, mean.low, mean.high)]
+            cells += [s.fallbacks, s.privileged]
+            cells += _percent(s.safe_site_by_tile)[1:] + _percent(s.success_by_tile)[1:]
+            writer.writerow(cells)
+
+
+def write_episodes(folder: Path, rows: Sequence[EpisodeRow]) -> None:
+    """Write the rows as episodes.csv and episodes.parquet; equal rows give equal CSV bytes."""
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    with (folder / "episodes.csv").open("w", newline="") as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(ROW_COLUMNS)
+        for row in rows:
+            values = (getattr(row, name) for name in ROW_COLUMNS)
+            writer.writerow([_number(v) if isinstance(v, float) else v for v in values])
+    columns = {name: [getattr(row, name) for row in rows] for name in ROW_COLUMNS}
+    parquet.write_table(pa.table(columns), folder / "episodes.parquet")
+
+
+def write_timings(path: Path, decision_time: dict[str, np.ndarray]) -> None:
+    """Write how long decisions took; the only table that is not reproducible."""
+    with path.open("w", newline="") as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(["policy", *(f"decision_time_ms_{q}" for q in ("p50", "p99", "max"))])
+        for policy, seconds in decision_time.items():
+            quantiles = 1000.0 * np.quantile(seconds, (0.5, 0.99, 1.0))
+            writer.writerow([policy, *(f"{value:.4g}" for value in quantiles)])
+
+
+def print_table(summaries: Sequence[PolicySummary]) -> None:
+    """Print the table, with the paper's rows below ours."""
+    from rich.console import Console
+    from rich.table import Table
+
+    first = summaries[0]
+    title = f"preset {first.preset}, {first.episodes} episodes (mean, 95 % interval; [] clustered by tile)"
+    table = Table(title=title)
+    table.add_column("policy")
+    headings = ("safe site %", "success %", "p", "miss m", "speed m/s", "prop. %", "slant deg", "thrust N")
+    for heading in (*headings, "reward", "fallb."):
+        table.add_column(heading, justify="right")
+    for s in summaries:
+        table.add_row(*_printed_cells(s))
+    table.add_section()
+    for name, row in PAPER_ROWS.items():
+        cells = [f"{row[m]:.4g}" if m in row else "" for m in MEASURES]
+        table.add_row(f"paper: {name}", f"{row['safe_site_percent']:.1f}", "", "", *cells, "", style="dim")
+    Console(width=max(Console().width, 146)).print(table)
+
+
+def _printed_cells(summary: PolicySummary) -> list[str]:
+    def ratio(plain: Interval, tiled: Interval) -> str:
+        ends = [100.0 * value for value in (plain.estimate, plain.low, plain.high, tiled.low, tiled.high)]
+        return "{:.1f} ({:.1f}-{:.1f})\n\\[{:.1f}-{:.1f}]".format(*ends)
+
+    p = summary.mcnemar_p
+    cells = [
+        summary.policy + (" (privileged)" if summary.privileged else ""),
+        ratio(summary.safe_site, summary.safe_site_by_tile),
+        ratio(summary.success, summary.success_by_tile),
+        "" if np.isnan(p) else ("<1e-4" if p < 1e-4 else f"{p:.2g}"),
+    ]
+    for name in MEASURES:
+        mean = summary.means[name]
+        digits = 0 if name == "maximum_thrust_n" else 2 if name != "miss_distance_m" else 3
+        cells.append(f"{mean.estimate:.{digits}f}\n{mean.low:.{digits}f}-{mean.high:.{digits}f}")
+    return [*cells, str(summary.fallbacks)]
