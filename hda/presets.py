@@ -36,7 +36,7 @@ PRESETS: dict[str, Preset] = {
         ),
         Preset(
             name="hard",
-            terrain=TerrainParameters(rocks=BOULDERS, islands=IslandField(25.0, threshold=-1.2)),
+            terrain=TerrainParameters(rocks=BOULDERS, islands=IslandField(25.0, threshold=-1.0)),
         ),
     )
 }

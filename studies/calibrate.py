@@ -49,7 +49,7 @@ class Search:
 
 SEARCHES = {
     "paper": Search(89.7, "smoothing_scale", (12.0, 16.0, 20.0, 24.0, 30.0, 40.0), digits=0),
-    "hard": Search(60.0, "threshold", (-0.8, -1.0, -1.2, -1.4, -1.6), digits=2),
+    "hard": Search(60.0, "threshold", (-0.8, -1.0, -1.2, -1.4), digits=1),
 }
 """The search that each preset was made by."""
 GROUND_EPISODES = 600

@@ -44,11 +44,11 @@ def draw_figures(out: Path, study: Study, rows: Sequence[EpisodeRow]) -> None:
 
 
 def choose_episode(rows: Sequence[EpisodeRow]) -> int:
-    """First episode on which the policies part (one lands safely, another does not), else the first one."""
-    seen: dict[int, set[bool]] = {}
+    """First episode that fewest policies land safely, but some do: there the difference shows; else the first."""
+    safe: dict[int, int] = {}
     for row in rows:
-        seen.setdefault(row.episode, set()).add(row.safe_site)
-    return next((episode for episode in sorted(seen) if len(seen[episode]) > 1), min(seen))
+        safe[row.episode] = safe.get(row.episode, 0) + row.safe_site
+    return min(safe, key=lambda episode: (safe[episode] == 0, safe[episode], episode))
 
 
 def save_flight(path: Path, record: EpisodeRecord) -> None:
