@@ -44,7 +44,7 @@ def draw_figures(out: Path, study: Study, rows: Sequence[EpisodeRow]) -> None:
 
 
 def choose_episode(rows: Sequence[EpisodeRow]) -> int:
-    """First episode that fewest policies land safely, but some do: there the difference shows; else the first."""
+    """First episode that fewest policies land safely, but some do; else the first."""
     safe: dict[int, int] = {}
     for row in rows:
         safe[row.episode] = safe.get(row.episode, 0) + row.safe_site

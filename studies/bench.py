@@ -1,0 +1,99 @@
+"""Measure the speed of the inner loops: a decision step, a tile, a safety map; after warm-up, in one run."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from time import perf_counter
+
+import numpy as np
+import tyro
+from rich.console import Console
+from rich.table import Table
+
+from guidance.validation import finite_number
+from hda.episode import advance, begin_flight, observe
+from hda.policy import PrivilegedPolicy
+from hda.presets import sample_scenario
+from hda.registry import make_policy
+from hda.terrain_timing import measure_terrain
+
+
+@dataclass(frozen=True)
+class Bench:
+    """Command line of the bench.
+
+    Attributes:
+        policy: whose decisions are timed; not a privileged one.
+        preset: the setting.
+        episodes: episodes that are flown for the decision step.
+        repeats: repetitions of the terrain work.
+    """
+
+    policy: str = "single-divert"
+    preset: str = "paper"
+    episodes: int = 200
+    repeats: int = 5
+
+
+def measure_steps(options: Bench) -> dict[str, np.ndarray]:
+    """Wall time [s] of each look, decision and interval of flight over the episodes.
+
+    Raises:
+        ValueError: the policy is privileged, or a name is unknown.
+    """
+    policy = make_policy(options.policy)
+    if isinstance(policy, PrivilegedPolicy):
+        raise ValueError(f"policy must not be privileged, got {options.policy!r}")
+    times: list[tuple[float, float, float]] = []
+    warm_up = 5
+    for episode in range(-warm_up, options.episodes):
+        scenario = sample_scenario(options.preset, 0, episode % options.episodes, "tuning")
+        memory = policy.begin(scenario.view, scenario.streams.policy())
+        flight, ended = begin_flight(scenario), False
+        while not ended:
+            start = perf_counter()
+            observation = observe(scenario, flight)
+            looked = perf_counter()
+            decision, memory = policy.decide(observation, memory)
+            decided = perf_counter()
+            step = advance(scenario, flight, decision)
+            flown = perf_counter()
+            flight, ended = step.flight, step.outcome is not None
+            if episode >= 0:
+                times.append((looked - start, decided - looked, flown - decided))
+    looks, decisions, flights = np.array(times).T
+    return {
+        "look": looks,
+        f"decision ({options.policy})": decisions,
+        "5 s of flight": flights,
+        "decision step (look + 5 s of flight)": looks + flights,
+    }
+
+
+def bench(options: Bench) -> None:
+    """Measure and print."""
+    finite_number("episodes", options.episodes, at_least=1)
+    table = Table(title=f"preset {options.preset}, {options.episodes} episodes; one core unless said")
+    for column in ("work", "median", "99 %", "unit"):
+        table.add_column(column, justify="left" if column == "work" else "right")
+    for name, seconds in measure_steps(options).items():
+        middle, high = 1e6 * np.quantile(seconds, (0.5, 0.99))
+        table.add_row(name, f"{middle:.0f}", f"{high:.0f}", "us")
+    for wall in measure_terrain(options.repeats):
+        table.add_row(wall.name, f"{wall.median:.3f}", f"{max(wall.seconds):.3f}", "s")
+    Console().print(table)
+
+
+def main() -> None:
+    """Command line; a wrong option is one line on stderr and exit code 2."""
+    options = tyro.cli(Bench, description=__doc__)
+    try:
+        bench(options)
+    except ValueError as error:
+        Console(stderr=True).print(f"error: {error}", style="red", markup=False, highlight=False)
+        sys.exit(2)
+
+
+if __name__ == "__main__":
+    main()
