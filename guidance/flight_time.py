@@ -19,6 +19,7 @@ from guidance.time_window import TimeWindow
 _STRETCH = 1.7  # greatest change of the time in one unbracketed step
 _BLIND_STEP = 1.25  # change of the time where nothing is known of the curvature
 _MOST_STEPS = 40
+_KINK = 5.0  # tolerances that a smooth model may not overlook between two samples
 
 
 class TimedSolution(Protocol):
@@ -131,7 +132,7 @@ class TimeSearch(Generic[Solution]):
         while len(self.samples) < _MOST_STEPS and not self._closed():
             goal = self._goal(latest)
             step = min(max(goal, self.low), self.high)
-            if 0.5 * abs(latest.slope * (step - latest.time)) < self._tolerance and latest.solved:
+            if 0.5 * abs(latest.slope * (step - latest.time)) < self._tolerance and self._kink() < _KINK:
                 break
             if step in self._edges:
                 if self.high - self.low <= 1e-5 * self.high:
@@ -181,6 +182,11 @@ class TimeSearch(Generic[Solution]):
             if falling and rising and goal is not None and pair[0].time < goal < pair[1].time:
                 return goal
         goal = self.model.stationary_time(latest)
+        if len(feasible) >= 2 and not (falling and rising):
+            before = self.samples[-2]
+            if before.solved and abs(latest.slope) > 0.5 * abs(before.slope):  # no end in sight: go faster
+                least = 2.0 * abs(latest.time - before.time)
+                goal = latest.time + math.copysign(max(least, abs(goal - latest.time)), goal - latest.time)
         return min(max(goal, latest.time / _STRETCH), latest.time * _STRETCH)
 
     def _parabola(self, feasible: list[Solution]) -> float | None:
@@ -204,14 +210,22 @@ class TimeSearch(Generic[Solution]):
         last = [s.slope < 0.0 for s in self.samples[-3:] if s.solved]
         return len(last) == 3 and last[-1] == last[-2]
 
-    def _closed(self) -> bool:
-        """Whether the tangents at the samples next to the optimum leave nothing to gain (J convex)."""
+    def _kink(self) -> float:
+        """What the tangents at the samples next to the optimum leave to gain (J convex), in tolerances.
+
+        Zero where the optimum is not bracketed yet.
+        """
         falling = [s for s in self.samples if s.solved and s.slope < 0.0]
         rising = [s for s in self.samples if s.solved and s.slope >= 0.0]
         if self.best is None or not falling or not rising:
-            return False
+            return 0.0
         left, right = max(falling, key=lambda s: s.time), min(rising, key=lambda s: s.time)
-        return self.best.value - _tangents_cross(left, right)[1] < self._tolerance
+        return (self.best.value - _tangents_cross(left, right)[1]) / self._tolerance
+
+    def _closed(self) -> bool:
+        """Whether a bracketed optimum leaves nothing to gain."""
+        signs = {s.slope < 0.0 for s in self.samples if s.solved}
+        return len(signs) == 2 and self._kink() < 1.0
 
 
 def _tangents_cross(left: TimedSolution, right: TimedSolution) -> tuple[float, float]:
