@@ -58,7 +58,8 @@ class FarkasProof:
             np.add.at(remainder, part.column, part.value * y[part.row])
             descent -= float(part.bound @ y)
         doubt = float(np.abs(remainder).sum()) * self.reach
-        return (descent - doubt) / (abs(descent) + doubt) if np.isfinite(descent + doubt) else float("nan")
+        scale = abs(descent) + doubt
+        return (descent - doubt) / scale if np.isfinite(scale) and scale > 0.0 else float("nan")
 
     @property
     def verified(self) -> bool:

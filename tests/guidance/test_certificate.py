@@ -1,0 +1,122 @@
+"""Farkas proofs: they hold where they should, and a spoilt one is refused."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from descents import FEASIBLE, GRAVITY, TARGET, arguments, problem_of
+
+import guidance
+from guidance import PAPER_LANDER, InfeasibleError, PlanStatus, State
+from guidance.certificate import Certificate, FarkasProof
+from guidance.infeasibility import prove_at, prove_fixed_time, prove_free_time
+from guidance.minimum_propellant import ConvexTask
+from guidance.problem import LandingProblem
+
+START = [180.0, 120.0, 940.0, -7.0, -4.0, -28.0, 1200.0]
+
+
+def task(start=START, target=TARGET, **changes):
+    problem = LandingProblem(State.parse(start), np.asarray(target, float), PAPER_LANDER, GRAVITY)
+    return ConvexTask(replace(problem, **changes), 31)
+
+
+def test_too_short_a_flight_is_disproved_by_thrust():
+    proof = prove_at(task(), 12.0)
+    assert isinstance(proof, FarkasProof)
+    assert proof.verified
+    assert proof.margin > 0.9
+    assert "maximum thrust" in proof.causes
+
+
+def test_too_dear_a_flight_is_disproved_by_propellant():
+    proof = prove_at(task(), 80.0)
+    assert isinstance(proof, FarkasProof)
+    assert proof.verified
+    assert "propellant" in proof.causes
+
+
+def test_a_feasible_time_is_not_disproved():
+    assert not isinstance(prove_at(task(), 27.0), FarkasProof)
+    assert prove_fixed_time(task(), 27.0) is None
+    refuted = prove_free_time(task())
+    assert not isinstance(refuted, Certificate)
+    assert refuted is not None
+    assert refuted.solved
+
+
+@pytest.mark.parametrize("case", FEASIBLE, ids=lambda case: case["name"])
+def test_nothing_disproves_the_reference_optima(case):
+    free = ConvexTask(problem_of(case), 61)
+    assert not isinstance(prove_at(free, 1.005 * case["optimal_time_of_flight"]), FarkasProof)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_spoilt_proof_is_refused(seed):
+    """Any change of the multipliers that leaves A'y far from zero must be noticed."""
+    proof = prove_at(task(), 12.0)
+    assert isinstance(proof, FarkasProof)
+    rng = np.random.default_rng(seed)
+    noise = rng.normal(size=proof.multipliers.size) * np.abs(proof.multipliers).max()
+    assert not replace(proof, multipliers=proof.multipliers + 0.1 * noise).verified
+    assert not replace(proof, multipliers=-proof.multipliers).verified
+    assert not replace(proof, multipliers=0.0 * proof.multipliers).verified
+    assert not replace(proof, multipliers=np.nan * proof.multipliers).verified
+
+
+def test_the_solution_of_a_feasible_problem_proves_nothing():
+    solution = task().solve(27.0)
+    proof = FarkasProof(27.0, solution.rows, solution.answer.dual, solution.scaled.reach)
+    assert not proof.verified
+
+
+def test_proofs_survive_scaling_but_not_a_wider_reach():
+    proof = prove_at(task(), 12.0)
+    assert isinstance(proof, FarkasProof)
+    assert replace(proof, multipliers=1e-6 * proof.multipliers).verified
+    assert not replace(proof, reach=1e15).verified
+
+
+def test_free_time_names_its_scope():
+    far = task(target=np.array([4000.0, 0.0, 50.0]))
+    certificate = prove_free_time(far)
+    assert isinstance(certificate, Certificate)
+    assert certificate.verified
+    assert "propellant" in certificate.causes
+    assert "Farkas" in certificate.scope or "closed-form" in certificate.scope
+
+
+def test_error_carries_the_certificate_and_says_the_cause():
+    with pytest.raises(InfeasibleError, match="propellant") as caught:
+        guidance.solve_pdg(START, [1900.0, 0.0, 50.0])
+    plan = caught.value.plan
+    assert plan.status is PlanStatus.INFEASIBLE
+    assert plan.certificate is not None
+    assert plan.certificate.verified
+    assert len(plan.certificate.proofs) >= 4
+    assert plan.certificate.scope.count("nodes") == 1
+
+
+@pytest.mark.parametrize(
+    ("change", "cause"),
+    [
+        ({"glide_slope_limit": 0.1}, "glide slope"),
+        ({"speed_limit": 20.0}, "speed"),
+        ({"lander": guidance.Lander(pointing_limit=0.02)}, "pointing"),
+    ],
+)
+def test_limits_that_forbid_a_flight_are_named(change, cause):
+    plan = guidance.solve_pdg(START, TARGET, throw=False, **change)
+    assert plan.status is PlanStatus.INFEASIBLE
+    assert plan.certificate is not None
+    assert plan.certificate.verified
+    assert cause in plan.certificate.causes
+
+
+def test_fixed_time_infeasibility():
+    plan = guidance.solve_pdg(START, TARGET, time_of_flight=10.0, throw=False)
+    assert plan.status is PlanStatus.INFEASIBLE
+    assert plan.certificate is not None
+    assert "10 s" in plan.certificate.scope
+    case = arguments(FEASIBLE[1])
+    assert guidance.solve_pdg(**case, time_of_flight=30.0).time_of_flight == 30.0

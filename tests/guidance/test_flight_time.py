@@ -1,0 +1,141 @@
+"""The search over the time of flight on costs with known optima, and the closed-form window."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from descents import FEASIBLE, GRAVITY, IMPOSSIBLE, TARGET, feasible_start, problem_of
+from hypothesis import given
+from hypothesis import strategies as st
+
+from guidance import PAPER_LANDER, State
+from guidance.flight_time import TimeModel, TimeSearch
+from guidance.minimum_propellant import ConvexTask, minimise_over_time
+from guidance.problem import LandingProblem
+from guidance.time_window import TimeWindow, guess_time, time_window
+
+
+@dataclass(frozen=True)
+class Sample:
+    time: float
+    value: float = math.nan
+    slope: float = math.nan
+    solved: bool = True
+
+
+def hyperbola(a=1.0, b=50.0, c=8.0, feasible=(0.0, math.inf)):
+    """J' = a - b/(T - c)^2, least at c + sqrt(b/a)."""
+
+    def evaluate(time):
+        if not feasible[0] <= time <= feasible[1] or time <= c:
+            return Sample(time, solved=False)
+        return Sample(time, a * time + b / (time - c), a - b / (time - c) ** 2)
+
+    return evaluate
+
+
+def search(evaluate, window=(1.0, 100.0), guess=20.0, tolerance=1e-4, asymptote=1.0):
+    run = TimeSearch(evaluate, TimeWindow(*window), tolerance, TimeModel(asymptote))
+    return run.run(guess), run
+
+
+@given(b=st.floats(5.0, 300.0), c=st.floats(1.5, 10.0), guess=st.floats(12.0, 90.0))
+def test_finds_the_optimum_of_a_hyperbola_in_few_solves(b, c, guess):
+    best, run = search(hyperbola(1.0, b, c), guess=guess)
+    optimum = c + math.sqrt(b)
+    assert best is not None
+    assert best.value - (optimum + b / (optimum - c)) < 3e-4
+    assert len(run.samples) <= 12
+
+
+@given(kink=st.floats(15.0, 60.0), left=st.floats(0.1, 20.0), guess=st.floats(5.0, 95.0))
+def test_finds_a_kink(kink, left, guess):
+    def evaluate(time):
+        slope = 0.9 if time >= kink else -left
+        return Sample(time, slope * (time - kink), slope)
+
+    best, run = search(evaluate, guess=guess)
+    assert best is not None
+    assert best.value < 1e-3
+    assert len(run.samples) <= 40
+
+
+@given(edge=st.floats(16.0, 60.0), guess=st.floats(5.0, 95.0))
+def test_optimum_at_the_edge_of_feasibility(edge, guess):
+    """One-sided: every time below `edge` is infeasible, and the cost rises from there."""
+    best, _ = search(hyperbola(feasible=(edge, math.inf)), guess=guess)
+    cost = hyperbola()(edge).value
+    assert best is not None
+    assert best.time >= edge
+    assert best.value - cost < 2e-3
+
+
+def test_optimum_at_the_ends_of_the_window():
+    falling, _ = search(lambda t: Sample(t, -t, -1.0))
+    assert falling is not None
+    assert falling.time == 100.0
+    rising, _ = search(lambda t: Sample(t, t, 0.9))
+    assert rising is not None
+    assert rising.time == pytest.approx(1.0)
+
+
+def test_narrow_feasible_window_is_found_by_the_grid():
+    best, run = search(hyperbola(c=2.0, feasible=(40.0, 50.0)), guess=20.0)
+    assert best is not None
+    assert 40.0 <= best.time <= 50.0
+    assert best.time == pytest.approx(40.0, abs=0.05)
+    assert len(run.samples) <= 40
+
+
+def test_no_feasible_time_ends_with_none_after_the_grid():
+    best, run = search(lambda t: Sample(t, solved=False))
+    assert best is None
+    assert len(run.samples) == len(TimeWindow(1.0, 100.0).grid()) + 1
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_window_holds_the_flight_that_made_the_start(seed):
+    """The optimum found anywhere lies in the window, and the window excludes nothing that flies."""
+    start = feasible_start(np.random.default_rng(seed))
+    problem = LandingProblem(State.parse(start), TARGET, PAPER_LANDER, GRAVITY)
+    window = time_window(problem)
+    assert not window.empty
+    free = time_window(problem, free_landing_point=True)
+    assert free.low <= window.low + 1e-9
+    assert free.high >= window.high - 1e-9
+    assert window.low <= guess_time(problem, window) <= window.high
+
+
+@pytest.mark.parametrize("case", FEASIBLE, ids=lambda case: case["name"])
+def test_no_time_outside_the_window_is_feasible(case):
+    problem = problem_of(case)
+    window = time_window(problem)
+    assert window.low < case["optimal_time_of_flight"] < window.high
+    task = ConvexTask(problem, 31, limit_propellant=True)
+    for time in (0.5 * window.low, 0.97 * window.low, 1.03 * window.high, 2.0 * window.high):
+        assert not task.solve(time).solved
+
+
+@pytest.mark.parametrize("case", IMPOSSIBLE, ids=lambda case: case["name"])
+def test_closed_form_bounds_settle_the_impossible_cases(case):
+    window = time_window(problem_of(case))
+    assert window.empty
+    assert window.cause in ("propellant", "altitude")
+
+
+def test_window_without_gravity_is_bounded():
+    problem = LandingProblem(State.parse([100, 0, 500, 0, 0, -5, 1200]), TARGET, PAPER_LANDER, np.zeros(3))
+    window = time_window(problem)
+    assert 0.0 < window.low < window.high < 1e4
+
+
+def test_agrees_with_a_fine_scan():
+    """The time search against brute force over a grid of times."""
+    case = FEASIBLE[1]
+    task = ConvexTask(problem_of(case), 31)
+    found = minimise_over_time(task).solution
+    assert found is not None
+    scan = [task.solve(time) for time in np.linspace(23.0, 32.0, 91)]
+    best = min(s.value for s in scan if s.solved)
+    assert found.value < best + 6e-6

@@ -1,0 +1,332 @@
+"""`solve_pdg` end to end: optima by three methods, refusals, dispersed and harsh starts, replanning."""
+
+import math
+import statistics
+import time
+
+import numpy as np
+import pytest
+from descents import (
+    FEASIBLE,
+    IMPOSSIBLE,
+    TARGET,
+    arguments,
+    feasible_start,
+    harsh_start,
+    paper_start,
+)
+
+import guidance
+from guidance import InfeasibleError, Lander, PlanStatus, SolverFailedError, State
+from guidance.clarabel_solver import ConicSolver
+from guidance.pdg import METHODS, time_left
+
+NAMES = [case["name"] for case in FEASIBLE]
+START = [180.0, 120.0, 940.0, -7.0, -4.0, -28.0, 1200.0]
+
+
+def check_flight(plan):
+    """What every plan with a flight promises, measured in SI on the flown plan."""
+    flown, lander = plan.residuals, plan.problem.lander
+    assert flown.position < 0.5
+    assert flown.velocity < 0.1
+    assert flown.thrust_above <= 1e-3 * lander.max_thrust
+    assert flown.thrust_below <= 1e-3 * lander.min_thrust
+    assert flown.propellant < 1e-3
+    assert flown.altitude < 0.2
+    assert flown.pointing < 1e-3
+    assert flown.glide_slope < 0.5
+    assert plan.mass[-1] >= lander.dry_mass - 1e-5
+    assert (plan.position[:, 2] >= plan.problem.target[2] - 1e-3).all()
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("case", FEASIBLE, ids=NAMES)
+def test_reference_optima(case, method):
+    plan = guidance.solve_pdg(**arguments(case), method=method)
+    allowed = 0.15 if case["name"] == "mars-6-engine" else 0.03
+    assert plan.status is PlanStatus.OPTIMAL
+    assert plan.method == method
+    assert abs(plan.mass[-1] - case["optimal_final_mass"]) < allowed
+    assert plan.time_of_flight == pytest.approx(case["optimal_time_of_flight"], abs=0.35)
+    check_flight(plan)
+
+
+@pytest.mark.parametrize("case", FEASIBLE, ids=NAMES)
+def test_methods_agree(case):
+    masses = [guidance.solve_pdg(**arguments(case), method=method).mass[-1] for method in METHODS]
+    assert max(masses) - min(masses) < 0.05
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("case", IMPOSSIBLE, ids=lambda case: case["name"])
+def test_impossible_cases(case, method):
+    with pytest.raises(InfeasibleError) as caught:
+        guidance.solve_pdg(**arguments(case), method=method)
+    proof = caught.value.plan.certificate
+    assert proof is not None
+    assert proof.verified
+    assert guidance.solve_pdg(**arguments(case), method=method, throw=False).status is PlanStatus.INFEASIBLE
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_infeasible_beyond_closed_form_bounds_by_every_method(method):
+    plan = guidance.solve_pdg(START, [1900.0, 0.0, 50.0], method=method, nodes=31, throw=False)
+    assert plan.status is PlanStatus.INFEASIBLE
+    assert plan.certificate is not None
+    assert plan.certificate.verified
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_fixed_time_by_every_method(method):
+    plan = guidance.solve_pdg(START, TARGET, time_of_flight=29.0, nodes=41, method=method)
+    assert plan.time_of_flight == pytest.approx(29.0)
+    assert plan.time[-1] == plan.time_of_flight
+    assert plan.nodes == 41
+    best = guidance.solve_pdg(START, TARGET, time_of_flight=29.0, nodes=41)
+    assert plan.mass[-1] == pytest.approx(best.mass[-1], abs=0.05)
+    check_flight(plan)
+
+
+@pytest.mark.parametrize(
+    ("change", "name"),
+    [
+        ({"state": [0, 0, 900, 0, 0, math.nan, 1200]}, "state"),
+        ({"state": [0, 0, 900, 0, 0, 1200]}, "state"),
+        ({"state": [0, 0, math.inf, 0, 0, 0, 1200]}, "state"),
+        ({"state": [0, 0, 900, 0, 0, -20, 1150]}, "mass"),
+        ({"state": [0, 0, 900, 0, 0, -20, -5]}, "mass"),
+        ({"state": [0, 0, 49.9, 0, 0, 0, 1200]}, "altitude"),
+        ({"target": [0, 0]}, "target"),
+        ({"target": [0, 0, math.nan]}, "target"),
+        ({"gravity": [0, 0, -math.inf]}, "gravity"),
+        ({"gravity": -1.62}, "gravity"),
+        ({"lander": "apollo"}, "lander"),
+        ({"glide_slope_limit": 1.6}, "glide_slope_limit"),
+        ({"glide_slope_limit": 0.0}, "glide_slope_limit"),
+        ({"speed_limit": -1.0}, "speed_limit"),
+        ({"time_of_flight": -3.0}, "time_of_flight"),
+        ({"time_of_flight": math.nan}, "time_of_flight"),
+        ({"nodes": 2}, "nodes"),
+        ({"nodes": 30.5}, "nodes"),
+        ({"method": "magic"}, "convex, casadi, cvxpy"),
+        ({"unreachable": "give up"}, "unreachable"),
+        ({"guess": [1, 2]}, "guess"),
+    ],
+)
+@pytest.mark.parametrize("throw", [True, False])
+def test_wrong_arguments_are_named_before_any_solver_runs(change, name, throw, monkeypatch):
+    def never(*_):
+        raise AssertionError("a solver was called")
+
+    monkeypatch.setattr(ConicSolver, "solve", never)
+    given = {"state": START, "target": TARGET} | change
+    with pytest.raises(ValueError, match=name):
+        guidance.solve_pdg(**given, throw=throw)
+
+
+def test_accepts_a_state():
+    a = guidance.solve_pdg(State.parse(START), TARGET)
+    b = guidance.solve_pdg(np.array(START), TARGET.tolist())
+    assert a.thrust.tobytes() == b.thrust.tobytes()
+
+
+def test_answers_do_not_depend_on_history():
+    before = guidance.solve_pdg(START, TARGET)
+    rng = np.random.default_rng(5)
+    for _ in range(3):
+        guidance.solve_pdg(harsh_start(rng), TARGET, throw=False, unreachable="nearest")
+    after = guidance.solve_pdg(START, TARGET)
+    assert after.thrust.tobytes() == before.thrust.tobytes()
+    assert after.time_of_flight == before.time_of_flight
+
+
+class Panic(BaseException):
+    """Stands for a pyo3 panic."""
+
+
+class Broken:
+    def update(self, **_):
+        raise Panic("attempt to subtract with overflow")
+
+
+def test_a_broken_solver_is_a_status_not_an_exception(monkeypatch):
+    def broken(self, values, bound, cost):
+        self._solver = Broken()
+        return solve(self, values, bound, cost)
+
+    solve = ConicSolver.solve
+    monkeypatch.setattr(ConicSolver, "solve", broken)
+    monkeypatch.setattr("guidance.convex._CACHE.templates", {})
+    plan = guidance.solve_pdg(START, TARGET, throw=False)
+    assert plan.status in (PlanStatus.SOLVER_FAILED, PlanStatus.LIMIT_REACHED)
+    assert plan.certificate is None
+    with pytest.raises(SolverFailedError):
+        guidance.solve_pdg(START, TARGET)
+
+
+@pytest.mark.parametrize("scale", [0.03, 1.0, 30.0])
+def test_large_and_small_scales(scale):
+    """Model rocket to orbiter: similar descents (lengths and exhaust velocity scaled) burn similar shares."""
+    root = math.sqrt(scale)
+    start = [100 * scale, 50 * scale, 500 * scale, -3 * root, 2 * root, -15 * root, 1200.0]
+    lander = Lander(specific_impulse=325.0 * root)
+    plan = guidance.solve_pdg(start, [0, 0, 0], lander=lander)
+    similar = guidance.solve_pdg([100, 50, 500, -3, 2, -15, 1200], [0, 0, 0])
+    assert plan.mass[-1] == pytest.approx(similar.mass[-1], abs=0.01)
+    assert plan.residuals.position < 1e-4 * 500 * scale
+
+
+def test_any_gravity_vector():
+    tilted = guidance.solve_pdg(START, TARGET, gravity=[0.4, -0.3, -1.5])
+    check_flight(tilted)
+    none = guidance.solve_pdg([50, 0, 200, -5, 0, -10, 1200], TARGET, gravity=[0, 0, 0])
+    assert none.residuals.position < 0.5
+
+
+def test_a_start_on_the_target_plane_and_at_rest_on_target():
+    hop = guidance.solve_pdg([30, 0, 50, 0, 0, 0, 1200], TARGET)
+    check_flight(hop)
+    assert hop.position[:, 2].max() > 51.0
+    still = guidance.solve_pdg([0, 0, 50, 0, 0, 0, 1200], TARGET, throw=False)
+    assert still.status is not PlanStatus.SOLVER_FAILED
+
+
+def disperse(sampler, count, seed, **options):
+    rng = np.random.default_rng(seed)
+    return [guidance.solve_pdg(sampler(rng), TARGET, throw=False, **options) for _ in range(count)]
+
+
+def check_dispersed_paper_starts(count, seed):
+    plans = disperse(paper_start, count, seed)
+    assert {plan.status for plan in plans} == {PlanStatus.OPTIMAL}
+    for plan in plans[:: max(1, count // 50)]:
+        check_flight(plan)
+
+
+def check_harsh_starts(count, seed):
+    raised = disperse(harsh_start, count, seed)
+    labelled = {PlanStatus.OPTIMAL, PlanStatus.INFEASIBLE, PlanStatus.LIMIT_REACHED}
+    assert {plan.status for plan in raised} <= labelled
+    undecided = [plan for plan in raised if plan.status is PlanStatus.LIMIT_REACHED]
+    assert len(undecided) <= 0.02 * count, [plan.message for plan in undecided]
+    for plan in raised:
+        if plan.status is PlanStatus.INFEASIBLE:
+            assert plan.certificate is not None
+            assert plan.certificate.verified
+    nearest = disperse(harsh_start, count, seed, unreachable="nearest")
+    saved = 0
+    for plan, other in zip(raised, nearest, strict=True):
+        if plan.status is PlanStatus.OPTIMAL:
+            assert other.status is PlanStatus.OPTIMAL
+        saved += other.status is PlanStatus.NEAREST
+    assert saved > 0.03 * count
+    for plan in [plan for plan in nearest if plan.status.has_flight][:: max(1, count // 40)]:
+        check_flight(plan)
+
+
+def check_feasible_starts(count, seed):
+    plans = disperse(feasible_start, count, seed)
+    spurious = [plan.problem.state for plan in plans if plan.status is not PlanStatus.OPTIMAL]
+    assert not spurious
+
+
+def test_dispersed_paper_starts():
+    check_dispersed_paper_starts(200, 11)
+
+
+def test_harsh_starts():
+    check_harsh_starts(60, 12)
+
+
+def test_no_spurious_infeasibility():
+    check_feasible_starts(100, 13)
+
+
+@pytest.mark.slow
+def test_many_dispersed_paper_starts():
+    check_dispersed_paper_starts(2000, 21)
+
+
+@pytest.mark.slow
+def test_many_harsh_starts():
+    check_harsh_starts(500, 22)
+
+
+@pytest.mark.slow
+def test_no_spurious_infeasibility_on_many():
+    check_feasible_starts(500, 23)
+
+
+def test_nearest_is_feasible_cheaper_ones_are_not_and_nearer_ones_neither():
+    """The landing error is the least: that point is reachable, one five metres nearer is not."""
+    far = np.array([2500.0, 600.0, 50.0])
+    plan = guidance.solve_pdg(START, far, unreachable="nearest")
+    assert plan.status is PlanStatus.NEAREST
+    landing = plan.position[-1]
+    assert landing[2] == pytest.approx(50.0, abs=1e-3)
+    assert plan.landing_error == pytest.approx(float(np.linalg.norm(landing - far)), abs=1e-3)
+    assert plan.landing_error < np.linalg.norm(far[:2] - START[:2])
+    check_flight(plan)
+    there = guidance.solve_pdg(START, landing, throw=False)
+    assert there.status is PlanStatus.OPTIMAL
+    toward = (far - landing) / np.linalg.norm(far - landing)
+    nearer = guidance.solve_pdg(START, landing + 5.0 * toward, throw=False)
+    assert nearer.status is PlanStatus.INFEASIBLE
+
+
+def test_nearest_at_a_fixed_time():
+    plan = guidance.solve_pdg(START, [1900.0, 0.0, 50.0], time_of_flight=25.0, unreachable="nearest")
+    assert plan.status is PlanStatus.NEAREST
+    assert plan.time_of_flight == 25.0
+    check_flight(plan)
+
+
+def test_nearest_where_the_target_can_be_reached_is_the_optimum():
+    plain = guidance.solve_pdg(START, TARGET)
+    asked = guidance.solve_pdg(START, TARGET, unreachable="nearest")
+    assert asked.status is PlanStatus.OPTIMAL
+    assert asked.thrust.tobytes() == plain.thrust.tobytes()
+
+
+def test_no_soft_landing_anywhere_is_infeasible_even_for_nearest():
+    plan = guidance.solve_pdg([0, 0, 110, 0, 0, -60, 1200], TARGET, unreachable="nearest", throw=False)
+    assert plan.status is PlanStatus.INFEASIBLE
+    with pytest.raises(InfeasibleError, match="altitude"):
+        guidance.solve_pdg([0, 0, 110, 0, 0, -60, 1200], TARGET, unreachable="nearest")
+
+
+def test_replanning_from_a_guess():
+    """On the way, undisturbed: the rest of the plan is the optimum (Bellman), found in fewer solves."""
+    plan = guidance.solve_pdg(START, TARGET)
+    k = 20
+    here = [*plan.position[k], *plan.velocity[k], plan.mass[k]]
+    assert time_left(plan, State.parse(here)) == pytest.approx(plan.time_of_flight - plan.time[k])
+    again = guidance.solve_pdg(here, TARGET, guess=plan)
+    assert again.status is PlanStatus.OPTIMAL
+    assert again.mass[-1] == pytest.approx(plan.mass[-1], abs=0.05)
+    moved = guidance.solve_pdg(here, TARGET + np.array([15.0, -10.0, 0.0]), guess=plan)
+    cold = guidance.solve_pdg(here, TARGET + np.array([15.0, -10.0, 0.0]))
+    assert moved.mass[-1] == pytest.approx(cold.mass[-1], abs=0.03)
+    warm = guidance.solve_pdg(here, TARGET, guess=plan, method="casadi")
+    assert warm.mass[-1] == pytest.approx(again.mass[-1], abs=0.05)
+
+
+def test_guess_without_a_flight_is_ignored():
+    nothing = guidance.solve_pdg([0, 0, 110, 0, 0, -60, 1200], TARGET, throw=False)
+    plan = guidance.solve_pdg(START, TARGET, guess=nothing)
+    assert plan.thrust.tobytes() == guidance.solve_pdg(START, TARGET).thrust.tobytes()
+
+
+def test_free_time_costs_at_most_four_fixed_time_solves():
+    rng = np.random.default_rng(8)
+    starts = [paper_start(rng) for _ in range(15)]
+    ratios = []
+    for start in [starts[0], *starts]:  # the first builds the solvers
+        clock = time.perf_counter()
+        plan = guidance.solve_pdg(start, TARGET)
+        free = time.perf_counter() - clock
+        clock = time.perf_counter()
+        guidance.solve_pdg(start, TARGET, time_of_flight=plan.time_of_flight)
+        ratios.append(free / (time.perf_counter() - clock))
+    assert statistics.median(ratios[1:]) < 4.0

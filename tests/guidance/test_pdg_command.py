@@ -1,0 +1,58 @@
+"""`python -m guidance.pdg` and the example, as a user runs them."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from guidance.pdg_command import main
+
+STATE = ["--state", "200", "100", "950", "-8", "-4", "-30", "1200", "--target", "0", "0", "50"]
+ROOT = Path(__file__).parents[2]
+
+
+def test_prints_and_draws(capsys, tmp_path):
+    picture = tmp_path / "plan.png"
+    main([*STATE, "--plot", str(picture), "--pointing-limit-deg", "40", "--glide-slope-limit-deg", "30"])
+    out = capsys.readouterr().out
+    assert "optimal (convex)" in out
+    assert "propellant" in out
+    assert picture.stat().st_size > 10_000
+
+
+def test_module_runs_and_explains_itself():
+    done = subprocess.run(
+        [sys.executable, "-m", "guidance.pdg", "--help"], capture_output=True, text=True, check=True, cwd=ROOT
+    )
+    assert "--glide-slope-limit-deg" in done.stdout
+    assert "Greatest thrust [N]" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "words"),
+    [
+        ([*STATE[:7], "1160"], 1, "propellant"),
+        ([*STATE[:7], "1100"], 2, "dry mass"),
+        ([*STATE, "--nodes", "2"], 2, "nodes"),
+        ([*STATE, "--plot", "plan.nonsense"], 2, "nonsense"),
+    ],
+)
+def test_failures_are_told_and_set_the_exit_status(arguments, status, words, capsys):
+    with pytest.raises(SystemExit) as caught:
+        main(arguments)
+    assert caught.value.code == status
+    assert words in capsys.readouterr().err
+
+
+def test_example_runs():
+    done = subprocess.run(
+        [sys.executable, str(ROOT / "examples" / "solve_pdg.py")],
+        capture_output=True,
+        text=True,
+        check=True,
+        cwd=ROOT,
+        env={"PYTHONPATH": str(ROOT), "PATH": ""},
+    )
+    assert "free time" in done.stdout
+    assert "nearest soft landing" in done.stdout
