@@ -1,0 +1,77 @@
+"""Common random numbers against numpy's own spawning."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hda.random_streams import EpisodeStreams
+
+SEEDS = st.integers(0, 2**32 - 1)
+EPISODES = st.integers(0, 100_000)
+SCENARIO, SENSOR, ACTUATOR, POLICY = range(4)
+
+
+def spawned(study_seed: int, episode: int, stream: int, *child: int) -> np.random.Generator:
+    """The generator that DESIGN names, made by spawning alone."""
+    sequence = np.random.SeedSequence([study_seed, episode]).spawn(4)[stream]
+    for k in child:
+        sequence = sequence.spawn(k + 1)[k]
+    return np.random.default_rng(sequence)
+
+
+@settings(max_examples=30)
+@given(seed=SEEDS, episode=EPISODES, k=st.integers(0, 25))
+def test_streams_are_the_spawned_children_of_seed_and_episode(seed, episode, k):
+    streams = EpisodeStreams(seed, episode)
+    assert streams.scenario().random(5).tolist() == spawned(seed, episode, SCENARIO).random(5).tolist()
+    assert streams.policy().random(5).tolist() == spawned(seed, episode, POLICY).random(5).tolist()
+    noise = spawned(seed, episode, SENSOR, k).standard_normal((64, 64), dtype=np.float32)
+    np.testing.assert_array_equal(streams.look(k, 64), noise)
+    error = spawned(seed, episode, ACTUATOR, k).uniform(-0.05, 0.05)
+    assert streams.thrust_error(k, 0.05) == error
+
+
+@given(order=st.permutations(range(6)))
+@settings(max_examples=20)
+def test_a_look_does_not_depend_on_the_looks_before(order):
+    alone = [EpisodeStreams(3, 7).look(k, 8) for k in range(6)]
+    streams = EpisodeStreams(3, 7)
+    for k in order:
+        streams.policy().random(k)
+        streams.thrust_error(k, 0.05)
+        np.testing.assert_array_equal(streams.look(k, 8), alone[k])
+
+
+def test_every_stream_and_every_child_is_different():
+    firsts = []
+    for seed in range(3):
+        for episode in range(3):
+            streams = EpisodeStreams(seed, episode)
+            firsts += [streams.scenario().uniform(-1, 1), streams.policy().uniform(-1, 1)]
+            firsts += [streams.thrust_error(k, 1.0) for k in range(20)]
+            firsts += [spawned(seed, episode, SENSOR, k).uniform(-1, 1) for k in range(20)]
+            looks = [streams.look(k, 2).tobytes() for k in range(20)]
+            assert len(set(looks)) == 20
+    assert len(set(firsts)) == len(firsts)
+
+
+@given(bound=st.floats(0.0, 0.9), k=st.integers(0, 20))
+def test_thrust_errors_keep_their_bound_and_scale_with_it(bound, k):
+    streams = EpisodeStreams(0, 1)
+    error = streams.thrust_error(k, bound)
+    assert abs(error) <= bound
+    assert error == pytest.approx(bound * streams.thrust_error(k, 1.0), rel=1e-9, abs=1e-15)
+
+
+def test_numpy_integers_count_as_whole_numbers():
+    plain = EpisodeStreams(4, 5).scenario().random()
+    assert EpisodeStreams(np.int64(4), np.uint8(5)).scenario().random() == plain  # pyright: ignore[reportArgumentType]
+
+
+@pytest.mark.parametrize("bad", [-1, 1.0, 0.5, "3", None, True, np.float64(2.0), float("nan")])
+@pytest.mark.parametrize("name", ["study_seed", "episode"])
+def test_a_bad_seed_is_named(name, bad):
+    arguments = {"study_seed": 0, "episode": 0, name: bad}
+    with pytest.raises(ValueError, match=f"^{name} must be a whole number"):
+        EpisodeStreams(**arguments)
