@@ -30,7 +30,7 @@ def test_a_look_is_algorithm_2(seed, pixels):
     probability = rng.random((40, 60), dtype=np.float32)  # not square: rows and columns must not mix
     target = np.array([*rng.uniform([-5.0, -5.0], [65.0, 45.0]), PLANE])
     height = rng.uniform(2.0, 300.0)
-    position = target + [*(height * rng.uniform(-0.5, 0.5, size=2)), height]
+    position = target + np.array([*(height * rng.uniform(-0.5, 0.5, size=2)), height])
     noise = rng.standard_normal((pixels, pixels), dtype=np.float32)
     noise *= rng.choice([1.0, 30.0])  # strong noise reaches both clips
     sensor = algorithm_2.Sensor(
@@ -72,7 +72,7 @@ def test_rows_grow_north_and_columns_east():
 )
 def test_the_width_is_the_slant_range_times_the_tangent(offset, height, field_of_view):
     target = np.array([500.0, 400.0, PLANE])
-    position = target + [*offset, height]
+    position = target + np.array([*offset, height])
     width = Lidar(field_of_view=field_of_view).width(position, target)
     slant_range = math.sqrt(offset[0] ** 2 + offset[1] ** 2 + height**2)
     assert width == pytest.approx(slant_range * math.tan(field_of_view), rel=1e-12)
@@ -80,7 +80,7 @@ def test_the_width_is_the_slant_range_times_the_tangent(offset, height, field_of
 
 def test_the_papers_field_of_view_is_a_hundred_metres_wide_at_500_m():
     target = np.array([0.0, 0.0, PLANE])
-    assert Lidar().width(target + [0.0, 0.0, 500.0], target) == pytest.approx(100.82, abs=0.01)
+    assert Lidar().width(target + np.array([0.0, 0.0, 500.0]), target) == pytest.approx(100.82, abs=0.01)
 
 
 def test_a_pixel_reads_the_cell_that_it_lies_in_up_to_its_west_and_south_edge():
