@@ -1,0 +1,101 @@
+"""Policies by name."""
+
+from typing import Any
+
+import pytest
+
+import hda
+from hda import registry
+from hda.policies.composition import ComposedPolicy, PrivilegedComposition
+from hda.policies.zem_zev import FixedGainZemZev
+from hda.policy import PrivilegedPolicy
+from hda.registry import PolicyEntry, policy_entry
+from hda.site_selection import NominalSite, OracleSite
+
+
+@pytest.fixture(autouse=True)
+def _own_registry(monkeypatch):
+    """A copy to write in, with this package's policies alone."""
+    hda.policy_names()
+    own = {name: entry for name, entry in registry._entries.items() if name in OWN}
+    monkeypatch.setattr(registry, "_entries", own)
+
+
+OWN = ("no-divert", "single-divert", "nearest-safe", "oracle")
+
+
+def nominal(name: str) -> ComposedPolicy:
+    return ComposedPolicy(name, NominalSite(), FixedGainZemZev())
+
+
+def privileged(name: str) -> PrivilegedComposition:
+    return PrivilegedComposition(name, OracleSite, FixedGainZemZev())
+
+
+def test_the_policies_that_need_no_learning_are_registered():
+    assert set(OWN) <= set(hda.policy_names())
+
+
+def test_a_made_policy_carries_its_name():
+    for name in hda.policy_names():
+        assert hda.make_policy(name).name == name
+        assert policy_entry(name).name == name
+        assert policy_entry(name).summary
+
+
+@pytest.mark.parametrize(
+    ("wrong", "meant"),
+    [
+        ("single-divertt", "single-divert"),
+        ("nearest", "nearest-safe"),
+        ("orakle", "oracle"),
+        ("No-Divert", "no-divert"),
+    ],
+)
+def test_an_unknown_name_suggests_the_nearest(wrong, meant):
+    with pytest.raises(ValueError, match=rf"unknown policy '{wrong}'; did you mean .*{meant}"):
+        hda.make_policy(wrong)
+    with pytest.raises(ValueError, match=r"valid: .*single-divert"):
+        policy_entry(wrong)
+
+
+@pytest.mark.parametrize("wrong", ["", "xyzzy", 7, None])
+def test_a_name_like_no_other_gets_the_whole_list(wrong: Any):
+    with pytest.raises(ValueError, match=r"unknown policy .*\(valid: .*no-divert.*\)"):
+        hda.make_policy(wrong)
+
+
+def test_a_registered_policy_can_be_made_and_comes_last():
+    hda.register_policy(PolicyEntry("mine", lambda: nominal("mine"), "a policy of one's own"))
+    assert hda.policy_names()[-1] == "mine"
+    assert hda.make_policy("mine").name == "mine"
+    assert hda.make_policy("mine") is not hda.make_policy("mine")
+
+
+def test_a_name_is_registered_once():
+    with pytest.raises(ValueError, match="'oracle' is registered already"):
+        hda.register_policy(PolicyEntry("oracle", lambda: privileged("oracle"), "again", privileged=True))
+    entry = PolicyEntry("mine", lambda: nominal("mine"), "once")
+    hda.register_policy(entry)
+    with pytest.raises(ValueError, match="'mine' is registered already"):
+        hda.register_policy(entry)
+
+
+def test_a_policy_that_calls_itself_otherwise_is_refused():
+    with pytest.raises(ValueError, match="entry 'mine' makes a policy that calls itself 'other'"):
+        hda.register_policy(PolicyEntry("mine", lambda: nominal("other"), "two names"))
+    assert "mine" not in hda.policy_names()
+
+
+@pytest.mark.parametrize("claim", [True, False])
+def test_privilege_must_be_told_as_it_is(claim):
+    make = nominal if claim else privileged
+    with pytest.raises(ValueError, match="must say whether its policy is privileged"):
+        hda.register_policy(PolicyEntry("mine", lambda: make("mine"), "not honest", privileged=claim))
+    assert "mine" not in hda.policy_names()
+
+
+def test_the_privileged_flag_of_every_entry_is_honest():
+    for name in hda.policy_names():
+        assert policy_entry(name).privileged == isinstance(hda.make_policy(name), PrivilegedPolicy)
+    assert [name for name in OWN if policy_entry(name).privileged] == ["oracle"]
