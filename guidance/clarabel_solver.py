@@ -84,6 +84,7 @@ class ConicSolver:
         cost: NDArray[np.float64],
         cones: tuple[tuple[str, int], ...],
         tolerance: float = 1e-8,
+        refine: bool = False,
     ) -> None:
         """Assemble from nominal numbers, and solve them once.
 
@@ -95,6 +96,8 @@ class ConicSolver:
             cost: q, shape (n,).
             cones: (kind, size) in row order.
             tolerance: gap and feasibility tolerance.
+            refine: whether to refine each linear solve; it takes two fifths of the time, and well-scaled
+                problems end in the same place without it.
 
         Raises:
             ValueError: the data do not fit together or are not finite.
@@ -117,6 +120,7 @@ class ConicSolver:
         settings.max_threads = 1
         settings.direct_solve_method = "qdldl"
         settings.max_iter = 100
+        settings.iterative_refinement_enable = refine
         for name in ("tol_gap_abs", "tol_gap_rel", "tol_feas"):
             setattr(settings, name, tolerance)
         quadratic = csc_matrix((cost.size, cost.size))

@@ -165,8 +165,9 @@ class ConvexTemplate:
         values, bound = self._numbers(rows)
         shape = (int(first[-1]), self.layout.size)
         matrix = csc_matrix((values[self._order], self._row[self._order], pointer), shape=shape)
-        self.cones = _cones(rows)
-        self._solver = ConicSolver(matrix, bound, self.cost(False), self.cones, tolerance)
+        self._assembled = matrix, bound, self.cost(False), _cones(rows), tolerance
+        self._solver = ConicSolver(*self._assembled)
+        self._careful: ConicSolver | None = None
 
     def rows(self, scaled: ScaledProblem) -> list[Rows]:
         """Constraint rows for given numbers."""
@@ -191,6 +192,9 @@ class ConvexTemplate:
         values, bound = self._numbers(rows)
         cost = self.cost(least_error)
         answer = self._solver.solve(values[self._order], bound, cost)
+        if answer.status in (SolveStatus.FAILED, SolveStatus.LIMIT_REACHED):
+            self._careful = self._careful or ConicSolver(*self._assembled, refine=True)
+            answer = self._careful.solve(values[self._order], bound, cost)
         if answer.status is not SolveStatus.SOLVED:
             return ConvexSolution(answer, self.layout, scaled, rows, np.nan, np.nan)
         unit, power = (scaled.length, 2) if least_error else (scaled.kappa, 1)

@@ -88,15 +88,17 @@ def bounds_hold(problem: LandingProblem, solution: ConvexSolution, reference: Ar
 
 
 def relaxation_tight(problem: LandingProblem, solution: ConvexSolution) -> bool:
-    """Whether the thrust itself, not only its slack, stays above min_thrust to 0.1 %.
+    """Whether the thrust itself, not only its slack, keeps min_thrust and the pointing limit to 0.1 %.
 
-    It does wherever the convexification is lossless; it may not where the time of flight is fixed and too
-    long.
+    It does wherever the convexification is lossless. It may not where the time of flight is fixed and too
+    long, or where the engine's least thrust exceeds the weight.
     """
-    push = np.linalg.norm(solution.answer.primal[solution.layout.acceleration], axis=1)
-    thrust = push * np.exp(solution.log_mass)
-    ratio = problem.lander.min_thrust / problem.lander.max_thrust
-    return bool(thrust.min() >= ratio * (1.0 - 2.0 * _THRUST_TOLERANCE))
+    push = solution.answer.primal[solution.layout.acceleration]
+    size = np.linalg.norm(push, axis=1)
+    ratio, limit = problem.lander.min_thrust / problem.lander.max_thrust, problem.lander.pointing_limit
+    if (size * np.exp(solution.log_mass)).min() < ratio * (1.0 - 2.0 * _THRUST_TOLERANCE):
+        return False
+    return limit is None or bool((push[:, 2] >= np.cos(limit) * size - 2.0 * _THRUST_TOLERANCE).all())
 
 
 @dataclass(frozen=True, eq=False)
