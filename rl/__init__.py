@@ -1,1 +1,48 @@
-"""Placeholder."""
+"""Learning agents: Gymnasium environments, training, shipped weights, and the agents as policies.
+
+Importing this package registers the environments `LunarHDA-v0` and `LunarHDA-Map-v0` with Gymnasium and the
+agents with `hda.registry`. Nothing of torch is imported until something is trained.
+"""
+
+from typing import TYPE_CHECKING
+
+import gymnasium
+
+from guidance.exports import lazy_exports
+from hda.registry import register_policy
+from rl.catalogue import entries
+
+if TYPE_CHECKING:
+    from rl.action import ActionRanges, decide_action
+    from rl.artefacts import ArtefactError
+    from rl.dispersions import Dispersions
+    from rl.env import LunarHDAEnv, LunarHDAMapEnv
+    from rl.policy import AgentPolicy, AgentSite
+
+_HOMES = {
+    "rl.action": ("ActionRanges", "decide_action"),
+    "rl.artefacts": ("ArtefactError",),
+    "rl.dispersions": ("Dispersions",),
+    "rl.env": ("LunarHDAEnv", "LunarHDAMapEnv"),
+    "rl.policy": ("AgentPolicy", "AgentSite"),
+}
+
+__all__ = [
+    "ActionRanges",
+    "AgentPolicy",
+    "AgentSite",
+    "ArtefactError",
+    "Dispersions",
+    "LunarHDAEnv",
+    "LunarHDAMapEnv",
+    "decide_action",
+]
+
+__getattr__, __dir__ = lazy_exports(
+    __name__, {name: home for home, names in _HOMES.items() for name in names}
+)
+
+gymnasium.register("LunarHDA-v0", entry_point="rl.env:LunarHDAEnv")
+gymnasium.register("LunarHDA-Map-v0", entry_point="rl.env:LunarHDAMapEnv")
+for _entry in entries():
+    register_policy(_entry)

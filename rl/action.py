@@ -1,0 +1,80 @@
+"""The agent's action: five numbers in [-1, 1] for gains, a rate of time and a shift of the target."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from guidance.validation import finite_number
+from hda.observation import Observation
+from hda.policy import Decision, ZemZevCommand
+from hda.scenario import Range
+
+ACTION_NAMES = ("position_gain", "velocity_gain", "time_to_go_step", "shift_x", "shift_y")
+"""What each element of the action moves, in order."""
+
+
+@dataclass(frozen=True)
+class ActionRanges:
+    """What -1 and 1 mean for each element of the action (paper, table of actions); linear between.
+
+    Attributes:
+        position_gain: K_R.
+        velocity_gain: K_V.
+        time_to_go_step: [s] by how much the time to go falls over one decision interval of 5 s.
+        shift: alpha_x and alpha_y lie in [-shift, shift]: the target moves by that share of the look's width.
+            The paper says 0.25 in its text and 0.5 in its table.
+        nominal_interval: [s] the interval that `time_to_go_step` refers to.
+    """
+
+    position_gain: Range = field(default_factory=lambda: Range(5.0, 7.0))
+    velocity_gain: Range = field(default_factory=lambda: Range(1.0, 3.0))
+    time_to_go_step: Range = field(default_factory=lambda: Range(4.25, 5.75))
+    shift: float = 0.25
+    nominal_interval: float = 5.0
+
+    def __post_init__(self) -> None:
+        """Refuse ranges that cannot be flown."""
+        finite_number("shift", self.shift, at_least=0.0, at_most=0.5)
+        finite_number("nominal_interval", self.nominal_interval, above=0.0)
+        finite_number("time_to_go_step", self.time_to_go_step.low, above=0.0)
+
+
+PAPER_ACTIONS = ActionRanges()
+
+
+def decide_action(
+    action: NDArray[np.floating], observation: Observation, ranges: ActionRanges = PAPER_ACTIONS
+) -> Decision:
+    """Turn an action into the decision that the vehicle flies.
+
+    Args:
+        action: shape (5,), in the order of `ACTION_NAMES`; values outside [-1, 1] are clipped.
+        observation: what was seen; the target moves by a share of its width, x_f(t) = x_f(t-1) + alpha_x w.
+        ranges: what -1 and 1 mean.
+
+    Raises:
+        ValueError: the action has another shape or is not finite.
+    """
+    values = np.asarray(action, dtype=np.float64)
+    if values.shape != (5,):
+        raise ValueError(f"action must have shape (5,), got {values.shape}")
+    if not np.isfinite(values).all():
+        raise ValueError(f"action must be finite, got {values.tolist()}")
+    position_gain, velocity_gain, step, shift_x, shift_y = np.clip(values, -1.0, 1.0).tolist()
+    reach = ranges.shift * observation.width
+    site = observation.target + np.array([shift_x * reach, shift_y * reach, 0.0])
+    command = ZemZevCommand(
+        position_gain=_between(ranges.position_gain, position_gain),
+        velocity_gain=_between(ranges.velocity_gain, velocity_gain),
+        time_to_go=observation.time_to_go,
+        time_to_go_rate=_between(ranges.time_to_go_step, step) / ranges.nominal_interval,
+    )
+    return Decision(site, command)
+
+
+def _between(bounds: Range, value: float) -> float:
+    """Map [-1, 1] on the range."""
+    return bounds.low + 0.5 * (value + 1.0) * (bounds.high - bounds.low)

@@ -1,0 +1,38 @@
+"""The trained agents by name, as far as their weights are shipped."""
+
+from __future__ import annotations
+
+from hda.policies.composition import ComposedPolicy
+from hda.policies.zem_zev import FixedGainZemZev
+from hda.registry import PolicyEntry
+from rl.policy import AgentPolicy, AgentSite, shipped
+
+_AGENTS = {
+    "td3": "the paper's agent without memory: moves the target, the gains and the time to go",
+    "sac": "the same agent trained with soft actor-critic",
+    "td3-paper": "the plain recipe: the printed observation vector, TD3 as its authors published it",
+}
+
+
+def _agent(name: str) -> PolicyEntry:
+    return PolicyEntry(name, lambda: AgentPolicy(name, shipped(name)), _AGENTS[name])
+
+
+_ENTRIES = (
+    ("td3", _agent("td3")),
+    (
+        "td3",
+        PolicyEntry(
+            "td3-fixed-gain",
+            lambda: ComposedPolicy("td3-fixed-gain", AgentSite(shipped("td3")), FixedGainZemZev()),
+            "the paper's Fixed Control: the sites of td3, gains 6/2, time to go of the quartic",
+        ),
+    ),
+    ("sac", _agent("sac")),
+    ("td3-paper", _agent("td3-paper")),
+)
+
+
+def entries() -> tuple[PolicyEntry, ...]:
+    """Registry lines of the agents whose weight cards are there; the weights are verified in flight."""
+    return tuple(entry for weights, entry in _ENTRIES if shipped(weights).with_suffix(".json").exists())

@@ -1,0 +1,67 @@
+"""What chance does to an episode, each part with a name and a switch."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+
+from guidance.validation import finite_number
+from hda.scenario import Preset, Range
+
+_START_RANGES = ("altitude", "distance", "descent_speed", "horizontal_speed", "mass", "target_area")
+
+
+@dataclass(frozen=True)
+class Dispersions:
+    """Factors on the preset's own dispersions: 1 as in the preset, 0 off (the middle of a range).
+
+    Attributes:
+        altitude: spread of the initial altitude.
+        distance: spread of the initial horizontal distance to the first target.
+        descent_speed: spread of the initial descent speed.
+        horizontal_speed: spread of the initial horizontal speed.
+        approach_spread: spread of the horizontal velocity's direction about that of the target.
+        mass: spread of the initial mass (none in the paper's setting).
+        target_area: spread of the first target over the tile; 0 may find no target that is hazardous enough.
+        map_noise: noise of the observed safety map.
+        thrust_error: relative error of the applied thrust.
+
+    Raises:
+        ValueError: a factor is negative or not finite.
+    """
+
+    altitude: float = 1.0
+    distance: float = 1.0
+    descent_speed: float = 1.0
+    horizontal_speed: float = 1.0
+    approach_spread: float = 1.0
+    mass: float = 1.0
+    target_area: float = 1.0
+    map_noise: float = 1.0
+    thrust_error: float = 1.0
+
+    def __post_init__(self) -> None:
+        """Check every factor."""
+        for field in fields(self):
+            finite_number(field.name, getattr(self, field.name), at_least=0.0)
+
+    def applied(self, preset: Preset) -> Preset:
+        """The preset with its dispersions scaled by these factors; itself if all are 1."""
+        if self == Dispersions():
+            return preset
+        start = preset.start
+        ranges = {name: _scaled(getattr(start, name), getattr(self, name)) for name in _START_RANGES}
+        spread = start.approach_spread * self.approach_spread
+        return replace(
+            preset,
+            start=replace(start, **ranges, approach_spread=spread),
+            lidar=replace(preset.lidar, noise=preset.lidar.noise * self.map_noise),
+            rules=replace(preset.rules, thrust_error=preset.rules.thrust_error * self.thrust_error),
+        )
+
+
+def _scaled(bounds: Range, factor: float) -> Range:
+    if factor == 1.0:
+        return bounds
+    middle = 0.5 * (bounds.low + bounds.high)
+    half = 0.5 * factor * (bounds.high - bounds.low)
+    return Range(middle - half, middle + half)

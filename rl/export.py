@@ -1,0 +1,159 @@
+"""From runs to shipped weights: choose seed and checkpoint on the tuning tiles, then fly validation once."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import tyro
+
+from rl.artefacts import WEIGHTS_FOLDER, Tensors
+
+if TYPE_CHECKING:
+    from hda.scenario import Preset
+    from rl.algorithms import AgentSettings
+    from rl.scoring import Score
+
+CHOICE_SEED = 900_001
+"""Study seed of the choice, on the tuning tiles; not that of the periodic validation."""
+
+
+@dataclass(frozen=True)
+class ExportWeights:
+    """Make shipped weights from runs: the best checkpoint of the best seed, judged on the tuning tiles.
+
+    Attributes:
+        runs: folders of runs with equal settings and different seeds.
+        name: of the weights: NAME.safetensors and NAME.json.
+        candidates: best checkpoints of each run, by its own validation, that are flown again.
+        episodes: tuning episodes that each candidate flies.
+        validation_episodes: episodes on the validation tiles, flown once, for the card.
+        out: folder.
+    """
+
+    runs: tuple[Path, ...]
+    name: str
+    candidates: int = 5
+    episodes: int = 1000
+    validation_episodes: int = 1000
+    out: Annotated[Path, tyro.conf.arg(metavar="DIR")] = field(default=WEIGHTS_FOLDER)
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A checkpoint's actor and how it flew the tuning tiles."""
+
+    run: Path
+    seed: int
+    step: int
+    tensors: Tensors
+    score: Score
+
+
+def settings_from_json(values: dict[str, Any]) -> AgentSettings:
+    """Undo `dataclasses.asdict` and JSON on AgentSettings."""
+    from rl.algorithms import AgentSettings
+
+    return AgentSettings(**{**values, "hidden": tuple(values["hidden"])})
+
+
+def best_of_run(
+    run: Path, preset: Preset, settings: AgentSettings, options: ExportWeights, seed: int
+) -> Candidate:
+    """Fly the most promising checkpoints of one run again, on more tuning episodes; give the best.
+
+    Raises:
+        ValueError: the run has no validated checkpoint.
+    """
+    from rl.actor_export import policy_of
+    from rl.artefacts import load_artefact
+    from rl.scoring import score_policy
+    from rl.training import read_rows
+
+    rows = read_rows(run / "validation.csv")
+    if not rows:
+        raise ValueError(f"{run} has no validated checkpoint")
+    rows.sort(key=lambda row: (float(row["success_percent"]), float(row["reward"])), reverse=True)
+    found = []
+    for row in rows[: options.candidates]:
+        step = int(row["step"])
+        tensors = load_artefact(run / "actors" / f"step-{step:09d}", "actor").tensors
+        score = score_policy(policy_of(tensors, settings), preset, "tuning", CHOICE_SEED, options.episodes)
+        found.append(Candidate(run, seed, step, tensors, score))
+    return max(found, key=lambda candidate: candidate.score.rank)
+
+
+def run_export(options: ExportWeights) -> None:
+    """Run the command.
+
+    Raises:
+        ValueError: a folder is not a run, or the runs have different settings.
+    """
+    from rich.console import Console
+
+    from hda.dtm_library import Ground, prepare_tiles
+    from hda.presets import find_preset
+    from rl.actor_export import actor_card, policy_of
+    from rl.artefacts import library_versions, save_artefact
+    from rl.scoring import score_policy
+    from rl.training import TUNING_SEED, read_rows
+
+    console = Console()
+    cards = [_read_run(run) for run in options.runs]
+    first = cards[0]
+    if any((card["settings"], card["preset"]) != (first["settings"], first["preset"]) for card in cards):
+        raise ValueError("runs must have the same settings and preset")
+    settings, preset = settings_from_json(first["settings"]), find_preset(first["preset"])
+    for split in ("tuning", "validation"):
+        prepare_tiles(Ground(preset.terrain, preset.criteria), split)
+    best = []
+    for run, card in zip(options.runs, cards, strict=True):
+        best.append(best_of_run(run, preset, settings, options, card["seed"]))
+        console.print(f"{run}: step {best[-1].step}, {best[-1].score.as_dict()}")
+    chosen = max(best, key=lambda candidate: candidate.score.rank)
+    seeds = []
+    for candidate in best:
+        policy = policy_of(candidate.tensors, settings, options.name)
+        validation = score_policy(policy, preset, "validation", 0, options.validation_episodes)
+        console.print(f"seed {candidate.seed} on validation: {validation.as_dict()}")
+        seeds.append(
+            {
+                "seed": candidate.seed,
+                "step": candidate.step,
+                "tuning": candidate.score.as_dict(),
+                "validation": validation.as_dict(),
+            }
+        )
+    curve = [
+        {"step": int(row["step"]), "safe_site_percent": float(row["safe_site_percent"])}
+        for row in read_rows(chosen.run / "validation.csv")
+    ]
+    training = {
+        "command": f"python -m rl.train {first['recipe']} --seed {chosen.seed}"
+        f" --preset {preset.name} --steps {first['plan']['steps']}",
+        "settings": asdict(settings),
+        "preset": preset.name,
+        "ground": Ground(preset.terrain, preset.criteria).key,
+        "splits": {"learning": "train", "choice": "tuning", "report": "validation"},
+        "tuning_seeds": [TUNING_SEED, CHOICE_SEED],
+        "seed": chosen.seed,
+        "step": chosen.step,
+        "seeds": seeds,
+        "curve": curve,
+        "versions": library_versions(),
+    }
+    card = {**actor_card(settings), "training": training}
+    artefact = save_artefact(options.out / options.name, "actor", chosen.tensors, card)
+    console.print(f"wrote {options.out / options.name}.safetensors ({artefact.digest[:12]})")
+
+
+def _read_run(run: Path) -> dict[str, Any]:
+    try:
+        card = json.loads((run / "run.json").read_text())
+    except (OSError, ValueError) as error:
+        raise ValueError(f"{run} is not a run: {error}") from error
+    if not isinstance(card, dict) or not {"settings", "preset", "seed", "plan", "recipe"} <= set(card):
+        raise ValueError(f"{run / 'run.json'} is not the record of a run")
+    return card

@@ -1,0 +1,60 @@
+"""A picture of an episode under way: the true safety map, the path above it and the current field of view."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hda.episode import Step
+from hda.observation import Observation
+from hda.scenario import Scenario
+
+_SIZE = (10.0, 5.0)
+_DPI = 64
+
+
+def render_flight(scenario: Scenario, steps: Sequence[Step], observation: Observation) -> NDArray[np.uint8]:
+    """Draw the flight so far.
+
+    Args:
+        scenario: what is flown.
+        steps: what has been flown.
+        observation: the present look.
+
+    Returns:
+        RGB picture, shape (320, 640, 3): the ground around the path on the left, the look on the right.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+    from matplotlib.patches import Rectangle
+
+    start = scenario.initial_state.position[None]
+    path = np.concatenate([start, *(step.segment.path[1:, :3] for step in steps)])
+    figure = Figure(_SIZE, dpi=_DPI, layout="constrained")
+    canvas = FigureCanvasAgg(figure)
+    ground, seen = figure.subplots(1, 2)
+    rows, columns = scenario.tile.deterministic.shape
+    ground.imshow(
+        scenario.tile.deterministic, cmap="gray", origin="lower", extent=(0, columns, 0, rows), vmin=0, vmax=1
+    )
+    ground.plot(path[:, 0], path[:, 1], color="tab:red")
+    ground.plot(*observation.target[:2], "+", color="tab:orange", markersize=10)
+    half = 0.5 * observation.width
+    corner = observation.target[:2] - half
+    ground.add_patch(Rectangle((corner[0], corner[1]), 2 * half, 2 * half, fill=False, color="tab:red"))
+    middle = scenario.nominal_target
+    ground.set_xlim(middle[0] - 270, middle[0] + 270)
+    ground.set_ylim(middle[1] - 270, middle[1] + 270)
+    ground.set_xlabel("east [m]")
+    ground.set_ylabel("north [m]")
+    height = path[-1, 2] - observation.target[2]
+    ground.set_title(f"true safety; t = {observation.time:.0f} s, {height:.0f} m above the plane")
+    seen.imshow(
+        observation.safety_map, cmap="gray", origin="lower", vmin=0, vmax=1, extent=(-half, half, -half, half)
+    )
+    seen.plot(0, 0, "+", color="tab:orange", markersize=10)
+    seen.set_title("look: observed safety about the target [m]")
+    canvas.draw()
+    return np.asarray(canvas.buffer_rgba())[:, :, :3].copy()

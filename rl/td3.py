@@ -1,0 +1,59 @@
+"""Stable-Baselines3's TD3 with a faster update; the same mathematics.
+
+Against the original: no gradients of the critic's weights while the actor learns, one Adam kernel per
+optimiser (`fused`, set where the algorithm is made), and one call per list of weights in the slow following
+of the targets.
+"""
+
+from __future__ import annotations
+
+import torch
+from stable_baselines3 import TD3
+from torch.nn.functional import mse_loss
+
+
+class FastTD3(TD3):
+    """TD3 (Fujimoto, van Hoof, Meger 2018): clipped double Q-learning, target smoothing, delayed actor."""
+
+    def train(self, gradient_steps: int, batch_size: int = 100) -> None:
+        """Update critics, and every `policy_delay` updates the actor and the targets."""
+        self.policy.set_training_mode(True)
+        critic_losses, actor_losses = [], []
+        for _ in range(gradient_steps):
+            self._n_updates += 1
+            assert self.replay_buffer is not None
+            batch = self.replay_buffer.sample(batch_size)
+            critic_losses.append(self._update_critics(batch))
+            if self._n_updates % self.policy_delay == 0:
+                actor_losses.append(self._update_actor(batch.observations))
+        self.logger.record("train/n_updates", self._n_updates, exclude="tensorboard")
+        self.logger.record("train/critic_loss", sum(critic_losses) / len(critic_losses))
+        if actor_losses:
+            self.logger.record("train/actor_loss", sum(actor_losses) / len(actor_losses))
+
+    def _update_critics(self, batch) -> float:
+        with torch.no_grad():
+            noise = torch.randn_like(batch.actions) * self.target_policy_noise
+            noise.clamp_(-self.target_noise_clip, self.target_noise_clip)
+            actions = (self.actor_target(batch.next_observations) + noise).clamp_(-1.0, 1.0)
+            value = torch.minimum(*self.critic_target(batch.next_observations, actions))
+            target = batch.rewards + (1.0 - batch.dones) * self.gamma * value
+        first, second = self.critic(batch.observations, batch.actions)
+        loss = mse_loss(first, target) + mse_loss(second, target)
+        self.critic.optimizer.zero_grad()
+        loss.backward()
+        self.critic.optimizer.step()
+        return loss.item()
+
+    def _update_actor(self, observations: torch.Tensor) -> float:
+        self.critic.requires_grad_(False)
+        loss = -self.critic.q1_forward(observations, self.actor(observations)).mean()
+        self.actor.optimizer.zero_grad()
+        loss.backward()
+        self.actor.optimizer.step()
+        self.critic.requires_grad_(True)
+        follow = vars(torch)["_foreach_lerp_"]  # the one call that optimisers use; not in the type stubs
+        with torch.no_grad():
+            for network, target in ((self.critic, self.critic_target), (self.actor, self.actor_target)):
+                follow(list(target.parameters()), list(network.parameters()), self.tau)
+        return loss.item()

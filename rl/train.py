@@ -1,0 +1,105 @@
+"""Training at the command line. Each command explains its options with --help.
+
+python -m rl.train autoencoder                        # the map encoder that every agent needs
+python -m rl.train td3 --seed 0 --out runs/td3-0      # an agent; also sac, ddpg, tqc, td3-paper
+python -m rl.train td3 --seed 0 --out runs/td3-0 --resume
+python -m rl.train export --name td3 --runs runs/td3-0 runs/td3-1 runs/td3-2
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from rl.algorithms import RECIPES, AgentSettings
+from rl.export import ExportWeights, run_export
+from rl.train_autoencoder import TrainAutoencoder, run_autoencoder_training
+
+
+@dataclass(frozen=True)
+class TrainAgent:
+    """Train an agent on the training tiles; it is validated on the tuning tiles as it learns.
+
+    Attributes:
+        settings: what is learnt.
+        seed: of the first weights, the exploration and the episodes.
+        out: folder of the run; runs/NAME-SEED by default.
+        preset: setting to fly.
+        steps: environment steps, each followed by one update once the random steps are over.
+        resume: go on from the newest checkpoint in the folder.
+        validate_every: steps between validations.
+        validation_episodes: episodes of each validation.
+        checkpoint_every: least steps between checkpoints, which are taken where an episode ends.
+    """
+
+    settings: tyro.conf.OmitArgPrefixes[AgentSettings]
+    seed: int = 0
+    out: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
+    preset: str = "paper"
+    steps: int = 270_000
+    resume: bool = False
+    validate_every: int = 10_000
+    validation_episodes: int = 200
+    checkpoint_every: int = 10_000
+
+
+Command = (
+    Annotated[TrainAutoencoder, tyro.conf.subcommand("autoencoder")]
+    | Annotated[TrainAgent, tyro.conf.subcommand("td3", default=TrainAgent(RECIPES["td3"]))]
+    | Annotated[TrainAgent, tyro.conf.subcommand("sac", default=TrainAgent(RECIPES["sac"]))]
+    | Annotated[TrainAgent, tyro.conf.subcommand("ddpg", default=TrainAgent(RECIPES["ddpg"]))]
+    | Annotated[TrainAgent, tyro.conf.subcommand("tqc", default=TrainAgent(RECIPES["tqc"]))]
+    | Annotated[TrainAgent, tyro.conf.subcommand("td3-paper", default=TrainAgent(RECIPES["td3-paper"]))]
+    | Annotated[ExportWeights, tyro.conf.subcommand("export")]
+)
+
+
+def run_agent_training(options: TrainAgent, name: str) -> None:
+    """Run the command of an agent.
+
+    Raises:
+        ValueError: an option is out of range, or the folder holds another run.
+    """
+    from guidance.validation import finite_number
+    from hda.dtm_library import Ground, prepare_tiles
+    from hda.presets import find_preset
+    from rl.training import TrainingPlan, run_training
+
+    for field in ("steps", "validate_every", "validation_episodes", "checkpoint_every"):
+        finite_number(field, getattr(options, field), at_least=1)
+    finite_number("seed", options.seed, at_least=0)
+    preset = find_preset(options.preset)
+    for split in ("train", "tuning"):
+        prepare_tiles(Ground(preset.terrain, preset.criteria), split)
+    plan = TrainingPlan(
+        options.steps,
+        options.seed,
+        name,
+        options.validate_every,
+        options.validation_episodes,
+        options.checkpoint_every,
+    )
+    folder = options.out or Path("runs") / f"{name}-{options.seed}"
+    run_training(folder, preset, options.settings, plan, options.resume)
+
+
+def main() -> None:
+    """Command line."""
+    command = tyro.cli(Command, description=__doc__)  # type: ignore[call-overload]
+    try:
+        if isinstance(command, TrainAutoencoder):
+            run_autoencoder_training(command)
+        elif isinstance(command, ExportWeights):
+            run_export(command)
+        else:
+            run_agent_training(command, sys.argv[1])
+    except ValueError as error:
+        sys.exit(f"error: {error}")
+
+
+if __name__ == "__main__":
+    main()
