@@ -43,7 +43,7 @@ class AgentSettings:
     exploration_noise: float = 0.5
     random_steps: int = 20_000
     replay_size: int = 400_000
-    matmul_precision: Literal["highest", "high", "medium"] = "highest"
+    matmul_precision: Literal["highest", "high", "medium"] = "medium"
     shift: float = 0.25
 
     @property

@@ -82,7 +82,7 @@ class Recorder(BaseCallback):
 
     def restore(self, card: Mapping[str, Any]) -> None:
         """Take over what a checkpoint's card keeps, and drop what was logged after it."""
-        self.window = {name: list(values) for name, values in card["window"].items()}
+        self.window = {name: list(card["window"][name]) for name in _empty_window()}
         self.seconds_before = float(card["seconds"])
         self.last_checkpoint = self.steps_before = int(card["counters"]["num_timesteps"])
         for name in ("training.csv", "validation.csv"):

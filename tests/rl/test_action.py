@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from guidance.state import State
 from hda.observation import Observation
+from hda.policy import ZemZevCommand
 from rl.action import ACTION_NAMES, ActionRanges, decide_action
 
 OBSERVATION = Observation(
@@ -25,6 +26,7 @@ OBSERVATION = Observation(
 def flown(action):
     decision = decide_action(np.asarray(action), OBSERVATION)
     command = decision.command
+    assert isinstance(command, ZemZevCommand)
     shift = (decision.site - OBSERVATION.target) / OBSERVATION.width
     return command.position_gain, command.velocity_gain, 5.0 * command.time_to_go_rate, shift[0], shift[1]
 
@@ -44,9 +46,7 @@ def test_each_axis_moves_its_own_quantity_to_the_end_of_the_papers_table(axis, e
 def test_no_action_keeps_target_gains_and_clock():
     decision = decide_action(np.zeros(5, dtype=np.float32), OBSERVATION)
     assert np.array_equal(decision.site, OBSERVATION.target)
-    assert decision.command.time_to_go == OBSERVATION.time_to_go
-    assert decision.command.time_to_go_rate == 1.0
-    assert (decision.command.position_gain, decision.command.velocity_gain) == (6.0, 2.0)
+    assert decision.command == ZemZevCommand(6.0, 2.0, OBSERVATION.time_to_go, 1.0)
 
 
 @given(st.lists(st.floats(-3.0, 3.0), min_size=5, max_size=5))

@@ -73,7 +73,7 @@ def test_a_rollout_equals_fly_exactly(seed):
     actions = random_actions(seed)
     record: EpisodeRecord = fly(ScriptedPolicy(actions), scenario)
     env = LunarHDAMapEnv()
-    seen, _ = env.reset(options={"scenario": scenario})
+    seen, info = env.reset(options={"scenario": scenario})
     for k, observation in enumerate(record.observations):
         np.testing.assert_array_equal(seen["map"][0], np.round(observation.safety_map * 255).astype(np.uint8))
         seen, reward, terminated, truncated, info = env.step(actions[k])
@@ -105,7 +105,7 @@ def test_equal_seeds_give_equal_episodes_and_others_do_not(name):
         seen = [flatten(env.reset(seed=seed)[0])]
         for action in random_actions(3):
             observation, reward, terminated, truncated, _ = env.step(action)
-            seen.append(np.append(flatten(observation), reward))
+            seen.append(np.append(flatten(observation), float(reward)))
             if terminated or truncated:
                 break
         return seen
