@@ -39,7 +39,7 @@ SPLITS: dict[str, range] = {
 """Tile numbers: `train` for learning, `tuning` for every choice, `validation` and `fresh` for evaluation
 only."""
 
-_LAYERS = ("elevation", "probability", "deterministic")
+_LAYERS = {"elevation": np.float32, "probability": np.float32, "deterministic": np.bool_}
 _verified: set[Path] = set()
 
 
@@ -176,27 +176,34 @@ def _store(ground: Ground, tile: Tile) -> None:
         draft = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
     except OSError:
         return  # no place to keep it: the tile lives in memory
+    try:
+        _write(draft, tile)
+        os.replace(draft, folder)
+    except OSError:
+        shutil.rmtree(draft, ignore_errors=True)  # another process was first, or the disk is full
+
+
+def _write(folder: Path, tile: Tile) -> None:
     sums: dict[str, int] = {}
     for name in _LAYERS:
         layer = getattr(tile, name)
-        np.save(draft / f"{name}.npy", layer, allow_pickle=False)
+        np.save(folder / f"{name}.npy", layer, allow_pickle=False)
         sums[name] = zlib.crc32(np.ascontiguousarray(layer).tobytes())
-    (draft / "checksums.json").write_text(json.dumps(sums, sort_keys=True))
-    try:
-        os.replace(draft, folder)
-    except OSError:
-        shutil.rmtree(draft, ignore_errors=True)  # another process was first
+    (folder / "checksums.json").write_text(json.dumps(sums, sort_keys=True))
 
 
 def _read(folder: Path, number: int) -> Tile | None:
     """Map a stored tile; None where there is none or it is damaged. Checksums are tested once per process."""
     layers = {}
-    with suppress(OSError, ValueError, KeyError, TypeError):
+    with suppress(Exception):  # a damaged header makes numpy raise errors of many kinds (EOF, token, syntax)
         sums = json.loads((folder / "checksums.json").read_text())
-        for name in _LAYERS:
-            layers[name] = np.load(folder / f"{name}.npy", mmap_mode="r", allow_pickle=False).view(np.ndarray)
-            if folder not in _verified and zlib.crc32(layers[name]) != sums[name]:
+        for name, kind in _LAYERS.items():
+            layer = np.load(folder / f"{name}.npy", mmap_mode="r", allow_pickle=False).view(np.ndarray)
+            if layer.dtype != kind or layer.ndim != 2:  # the checksum covers the content, not the header
                 return None
+            if folder not in _verified and zlib.crc32(layer) != sums[name]:
+                return None
+            layers[name] = layer
         tile = Tile(number=number, **layers)
         _verified.add(folder)
         return tile
