@@ -206,6 +206,16 @@ def advance(scenario: Scenario, flight: Flight, decision: Decision) -> Step:
     return Step(after, segment, outcome, truncated, score_step(burnt, outcome), slant)
 
 
+def _check_answer(name: str, answer: object) -> tuple[Decision, Any]:
+    """Refuse what is not (Decision, memory), with the policy's name: a third party wrote it."""
+    if not isinstance(answer, tuple) or len(answer) != 2:
+        raise ValueError(f"policy {name!r} must return (Decision, memory), got {type(answer).__name__}")
+    decision, memory = answer
+    if not isinstance(decision, Decision):
+        raise ValueError(f"policy {name!r} must return a Decision, got {type(decision).__name__}")
+    return decision, memory
+
+
 def fly(policy: Policy[Any] | PrivilegedPolicy, scenario: Scenario) -> EpisodeRecord:
     """Fly one episode.
 
@@ -217,7 +227,8 @@ def fly(policy: Policy[Any] | PrivilegedPolicy, scenario: Scenario) -> EpisodeRe
         The record; equal for equal arguments, but for `decision_time`.
 
     Raises:
-        ValueError: the policy returns something that is not a Decision, or a site off the target plane.
+        ValueError: the policy returns something that is not (Decision, memory), or a site off the target
+            plane.
     """
     pilot = policy.informed(scenario.tile) if isinstance(policy, PrivilegedPolicy) else policy
     memory = pilot.begin(scenario.view, scenario.streams.policy())
@@ -229,10 +240,9 @@ def fly(policy: Policy[Any] | PrivilegedPolicy, scenario: Scenario) -> EpisodeRe
     while not steps or steps[-1].outcome is None:
         observation = observe(scenario, flight)
         started = clock.perf_counter()
-        decision, memory = pilot.decide(observation, memory)
+        answer = pilot.decide(observation, memory)
         durations.append(clock.perf_counter() - started)
-        if not isinstance(decision, Decision):
-            raise ValueError(f"policy {policy.name!r} must return a Decision, got {type(decision).__name__}")
+        decision, memory = _check_answer(policy.name, answer)
         step = advance(scenario, flight, decision)
         flight = step.flight
         observations.append(observation)

@@ -132,6 +132,9 @@ class Preset:
         rules: timing, dispersions, judgement.
         lander: the vehicle.
         gravity: [m/s^2] site frame, pointing down.
+
+    Raises:
+        ValueError: gravity does not point down, or a start has no propellant or lies below the target plane.
     """
 
     name: str
@@ -144,9 +147,11 @@ class Preset:
     gravity: tuple[float, float, float] = MOON_GRAVITY
 
     def __post_init__(self) -> None:
-        """The ground must be below."""
+        """The ground must be below, and the tank must hold something."""
         if finite_vector("gravity", self.gravity, 3)[2] >= 0.0:
             raise ValueError(f"gravity must point down (z below zero), got {self.gravity}")
+        finite_number("start.mass", self.start.mass.low, above=self.lander.dry_mass)
+        finite_number("start.altitude", self.start.altitude.low, above=self.terrain.maximum_elevation)
 
 
 @dataclass(frozen=True, eq=False)
