@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Protocol, TypeVar, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
+from guidance.tracking import TrackingReference
 from guidance.validation import finite_number, finite_vector
 from hda.observation import Observation, ScenarioView
 
@@ -63,7 +64,20 @@ class ZemZevCommand:
         finite_number("time_to_go_rate", self.time_to_go_rate, above=0.0)
 
 
-Command = ZemZevCommand
+@dataclass(frozen=True, eq=False)
+class PlanCommand:
+    """Track a planned descent; the flight ends where the plan does.
+
+    Attributes:
+        reference: states at the control instants from this decision on.
+        gains: (K_r [1/s^2], K_v [1/s]) of the feedback about it.
+    """
+
+    reference: TrackingReference
+    gains: tuple[float, float]
+
+
+Command = ZemZevCommand | PlanCommand
 
 
 @dataclass(frozen=True, eq=False)

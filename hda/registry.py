@@ -21,12 +21,14 @@ class PolicyEntry:
         make: gives a new policy of that name.
         summary: what it does, in one line.
         privileged: it sees the true map; every table marks it.
+        slow: a decision takes more than about 50 ms; flown only when asked for.
     """
 
     name: str
     make: Callable[[], AnyPolicy]
     summary: str
     privileged: bool = False
+    slow: bool = False
 
 
 _entries: dict[str, PolicyEntry] = {}

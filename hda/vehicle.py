@@ -21,7 +21,7 @@ from guidance.kernel import compile_kernel
 from guidance.lander import Lander
 from guidance.state import State
 from guidance.zem_zev import saturate_into, zem_zev_into
-from hda.policy import Decision
+from hda.policy import Decision, ZemZevCommand
 
 
 class FlightStatus(IntEnum):
@@ -35,6 +35,7 @@ class FlightStatus(IntEnum):
 
 
 _FLYING, _TOUCHDOWN, _TANK_EMPTY = 0, 1, 2
+_LEAST_TELLING = 0.05  # [m/s^2] commanded acceleration under which the engine's error is not estimated
 _Vehicle = tuple[float, float, float, float]  # min thrust, max thrust, exhaust velocity, dry mass
 
 
@@ -206,6 +207,76 @@ def _fly_zem_zev(
     return periods + 1, _FLYING
 
 
+@compile_kernel
+def _fly_plan(
+    start: NDArray[np.float64],
+    reference: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
+    gains: tuple[float, float],
+    timing: tuple[float, float],
+    thrust_error: float,
+    gravity: NDArray[np.float64],
+    vehicle: _Vehicle,
+    time: NDArray[np.float64],
+    path: NDArray[np.float64],
+    commanded: NDArray[np.float64],
+) -> tuple[int, int]:
+    """Track a reference for one interval; `timing` = (control period, plane). Returns (nodes, status).
+
+    The engine's error ratio is unknown at the start of the interval; once a period has been flown it is known
+    from the change of velocity, which is compared with what the command should have given.
+    """
+    position, velocity, feedforward = reference
+    period, plane = timing
+    periods = commanded.shape[0] - 1
+    left = feedforward.shape[0]
+    estimate = 0.0
+    path[0] = start
+    time[0] = 0.0
+    for k in range(periods + 1):
+        if k >= left:
+            commanded[k] = 0.0
+            time[k + 1] = time[k] + _fall(path[k], gravity, plane, path[k + 1])
+            return k + 2, _TOUCHDOWN
+        if k == periods:
+            break
+        for axis in range(3):
+            push = feedforward[k, axis]
+            push -= gains[0] * (path[k, axis] - position[k, axis])
+            push -= gains[1] * (path[k, 3 + axis] - velocity[k, axis])
+            commanded[k, axis] = path[k, 6] * push / (1.0 + estimate)
+        saturate_into(commanded[k], vehicle[0], vehicle[1])
+        flown, status = hold_period(
+            path[k], commanded[k], thrust_error, period, gravity, vehicle, plane, path[k + 1]
+        )
+        time[k + 1] = time[k] + flown
+        if status != _FLYING:
+            return k + 2, status
+        estimate = _estimate_error(path[k], path[k + 1], commanded[k], period, gravity, estimate)
+    return periods + 1, _FLYING
+
+
+@compile_kernel
+def _estimate_error(
+    before: NDArray[np.float64],
+    after: NDArray[np.float64],
+    commanded: NDArray[np.float64],
+    period: float,
+    gravity: NDArray[np.float64],
+    estimate: float,
+) -> float:
+    """Engine's error ratio from one period's change of velocity; the old estimate where it hardly burnt."""
+    square = 0.0
+    along = 0.0
+    for axis in range(3):
+        gained = (after[3 + axis] - before[3 + axis]) / period - gravity[axis]
+        square += commanded[axis] * commanded[axis]
+        along += commanded[axis] * gained
+    mean_mass = 0.5 * (before[6] + after[6])
+    if square < (_LEAST_TELLING * mean_mass) ** 2:
+        return estimate
+    return along * mean_mass / square - 1.0
+
+
 def fly_interval(
     state: State,
     decision: Decision,
@@ -226,29 +297,55 @@ def fly_interval(
 
     Returns:
         The flown segment.
+
+    Raises:
+        ValueError: a plan was sampled at another control period than the vehicle's.
     """
     period, periods = interval
     command = decision.command
     time = np.empty(periods + 2)
     path = np.empty((periods + 2, 7))
     commanded = np.empty((periods + 1, 3))
-    nodes, status = _fly_zem_zev(
-        state.as_array(),
-        decision.site,
-        (command.position_gain, command.velocity_gain),
-        (command.time_to_go, command.time_to_go_rate, period),
-        thrust_error,
-        gravity,
-        (lander.min_thrust, lander.max_thrust, lander.exhaust_velocity, lander.dry_mass),
-        time,
-        path,
-        commanded,
-    )
+    vehicle = (lander.min_thrust, lander.max_thrust, lander.exhaust_velocity, lander.dry_mass)
+    if isinstance(command, ZemZevCommand):
+        nodes, status = _fly_zem_zev(
+            state.as_array(),
+            decision.site,
+            (command.position_gain, command.velocity_gain),
+            (command.time_to_go, command.time_to_go_rate, period),
+            thrust_error,
+            gravity,
+            vehicle,
+            time,
+            path,
+            commanded,
+        )
+        left = command.time_to_go - command.time_to_go_rate * float(time[nodes - 1])
+    else:
+        reference = command.reference
+        if abs(reference.control_period - period) > 1e-9 * period:
+            raise ValueError(
+                f"command: its reference has a control period of {reference.control_period:g} s,"
+                f" the vehicle {period:g} s"
+            )
+        nodes, status = _fly_plan(
+            state.as_array(),
+            (reference.position, reference.velocity, reference.thrust_acceleration),
+            command.gains,
+            (period, float(decision.site[2])),
+            thrust_error,
+            gravity,
+            vehicle,
+            time,
+            path,
+            commanded,
+        )
+        left = reference.duration - float(time[nodes - 1])
     return Segment(
         time=time[:nodes],
         path=path[:nodes],
         commanded=commanded[: nodes - 1],
-        time_to_go=command.time_to_go - command.time_to_go_rate * float(time[nodes - 1]),
+        time_to_go=left,
         thrust_error=thrust_error,
         status=FlightStatus(status),
     )

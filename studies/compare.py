@@ -8,6 +8,7 @@ against single-divert; means carry bootstrap intervals. Privileged policies see 
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
@@ -39,7 +40,7 @@ class Comparison:
 
     Attributes:
         episodes: episodes per policy, at least 1.
-        policies: names of policies, or `all`.
+        policies: names of policies; `default` is every one that is not slow, `all` is every one.
         preset: the setting: paper or hard.
         study_seed: seed of the study; equal seeds give equal episodes.csv and table.csv.
         split: tile split: validation or fresh to evaluate, tuning for choices.
@@ -49,7 +50,7 @@ class Comparison:
     """
 
     episodes: int = 1000
-    policies: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME ...")] = ("all",)
+    policies: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME ...")] = ("default",)
     preset: str = "paper"
     study_seed: int = 0
     split: str = "validation"
@@ -67,14 +68,31 @@ def plan_study(options: Comparison) -> Study:
     for name in ("episodes", "workers"):
         finite_number(name, getattr(options, name), at_least=1)
     finite_number("study_seed", options.study_seed, at_least=0)
-    wanted = set(policy_names() if "all" in options.policies else options.policies)
-    for name in options.policies:
-        if name != "all":
-            policy_entry(name)
+    return Study(
+        find_preset(options.preset),
+        choose_policies(options.policies),
+        options.episodes,
+        options.study_seed,
+        options.split,
+    )
+
+
+def choose_policies(wanted: Sequence[str]) -> tuple[str, ...]:
+    """Registered names in the order of the registry, each once; `default` and `all` stand for several.
+
+    Raises:
+        ValueError: a name is unknown, or none was given.
+    """
     if not wanted:
         raise ValueError("policies must name at least one policy")
-    ordered = tuple(name for name in policy_names() if name in wanted)
-    return Study(find_preset(options.preset), ordered, options.episodes, options.study_seed, options.split)
+    groups = {
+        "all": policy_names(),
+        "default": tuple(name for name in policy_names() if not policy_entry(name).slow),
+    }
+    chosen = {name for entry in wanted for name in groups.get(entry, (entry,))}
+    for name in sorted(chosen):
+        policy_entry(name)
+    return tuple(name for name in policy_names() if name in chosen)
 
 
 def open_folder(out: Path) -> Path:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from guidance.soft_landing import SoftLandingOptions
 from hda.policies.composition import ComposedPolicy, PrivilegedComposition
+from hda.policies.planned_descent import PlannedDescent
 from hda.policies.zem_zev import FixedGainZemZev
 from hda.registry import PolicyEntry
 from hda.site_selection import NearestSafeSite, NominalSite, OracleSite, SingleDivertSite
@@ -27,6 +29,30 @@ ENTRIES: tuple[PolicyEntry, ...] = (
         "oracle",
         lambda: PrivilegedComposition("oracle", OracleSite, FixedGainZemZev()),
         "knows the true map: the nearest truly safe ground with 2 m of clearance",
+        privileged=True,
+    ),
+    PolicyEntry(
+        "single-divert+convex",
+        lambda: ComposedPolicy("single-divert+convex", SingleDivertSite(), PlannedDescent()),
+        "the sites of single-divert, flown by convex guidance",
+    ),
+    PolicyEntry(
+        "nearest-safe+convex",
+        lambda: ComposedPolicy("nearest-safe+convex", NearestSafeSite(), PlannedDescent()),
+        "the sites of nearest-safe, flown by convex guidance",
+    ),
+    PolicyEntry(
+        "nearest-safe+casadi",
+        lambda: ComposedPolicy(
+            "nearest-safe+casadi", NearestSafeSite(), PlannedDescent(SoftLandingOptions(method="casadi"))
+        ),
+        "the same, planned by the nonconvex reference",
+        slow=True,
+    ),
+    PolicyEntry(
+        "oracle+convex",
+        lambda: PrivilegedComposition("oracle+convex", OracleSite, PlannedDescent()),
+        "the sites of oracle, flown by convex guidance",
         privileged=True,
     ),
 )

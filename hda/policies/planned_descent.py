@@ -1,0 +1,100 @@
+"""Fuel-optimal guidance in closed loop: replan at each look, track the plan, fall back in a stated order."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from guidance.plan import PlanStatus
+from guidance.soft_landing import DEFAULT_OPTIONS, SoftLanding, SoftLandingOptions, plan_soft_landing
+from guidance.tracking import DEFAULT_WEIGHTS, TrackingReference, TrackingWeights, tracking_gains
+from hda.observation import Observation, ScenarioView
+from hda.policies.zem_zev import FixedGainZemZev
+from hda.policy import Command, DecisionStatus, PlanCommand
+
+
+@dataclass(frozen=True, eq=False)
+class DescentMemory:
+    """What planned guidance remembers between looks.
+
+    Attributes:
+        view: the scenario.
+        site: [m] shape (3,), where the last plan goes; None before the first.
+        reference: what is left of the last plan at the next look; None if nothing is.
+    """
+
+    view: ScenarioView
+    site: NDArray[np.float64] | None = None
+    reference: TrackingReference | None = None
+
+
+@dataclass(frozen=True)
+class PlannedDescent:
+    """Plan the least-propellant descent at each look and track it.
+
+    If the site is out of reach it flies to the reachable point nearest to it; if the planner gives no answer,
+    the last plan flies on; if there is none, ZEM/ZEV flies. Each is labelled in the decision's status.
+
+    Attributes:
+        options: how plans are made.
+        weights: feedback about them.
+        commit_time: [s] with less time left than this, and the same site, the last plan flies on as it is.
+    """
+
+    options: SoftLandingOptions = DEFAULT_OPTIONS
+    weights: TrackingWeights = DEFAULT_WEIGHTS
+    commit_time: float = 10.0
+
+    def begin(self, view: ScenarioView) -> DescentMemory:
+        """No plan yet."""
+        return DescentMemory(view)
+
+    def command(
+        self, observation: Observation, site: NDArray[np.float64], memory: DescentMemory
+    ) -> tuple[Command, DecisionStatus, DescentMemory]:
+        """Replan, or fly on."""
+        same_site = memory.site is not None and np.array_equal(site, memory.site)
+        left = memory.reference
+        if same_site and left is not None and left.duration <= self.commit_time:
+            return self._track(left, DecisionStatus.NOMINAL, memory)
+        landing = self._plan(observation, site, memory, left if same_site else None)
+        if same_site and left is not None and (landing is None or landing.reference is None):
+            return self._track(left, DecisionStatus.NOMINAL, memory)  # the plan in flight is still good
+        if landing is not None and landing.reference is not None:
+            nearest = landing.status is PlanStatus.NEAREST
+            status = DecisionStatus.FALLBACK_NEAREST if nearest else DecisionStatus.NOMINAL
+            return self._track(landing.reference, status, replace(memory, site=site.copy()))
+        if left is not None:
+            return self._track(left, DecisionStatus.FALLBACK_LAST_PLAN, memory)
+        gravity = FixedGainZemZev().begin(memory.view)
+        command, _, _ = FixedGainZemZev().command(observation, site, gravity)
+        return command, DecisionStatus.FALLBACK_ZEM_ZEV, replace(memory, site=None, reference=None)
+
+    def _plan(
+        self,
+        observation: Observation,
+        site: NDArray[np.float64],
+        memory: DescentMemory,
+        left: TrackingReference | None,
+    ) -> SoftLanding | None:
+        """Ask the planner; None where the question itself is out of its range, such as below the gate."""
+        view, state = memory.view, observation.state
+        if state.mass <= view.lander.dry_mass:
+            return None
+        duration = self.options.terminal_periods * view.control_period
+        if state.position[2] - site[2] <= 0.5 * self.options.terminal_deceleration * duration**2:
+            return None
+        periods = None if left is None else left.thrust_acceleration.shape[0]
+        return plan_soft_landing(
+            state, site, view.lander, view.control_period, self.options, view.gravity, periods
+        )
+
+    def _track(
+        self, reference: TrackingReference, status: DecisionStatus, memory: DescentMemory
+    ) -> tuple[PlanCommand, DecisionStatus, DescentMemory]:
+        view = memory.view
+        gains = tracking_gains(view.control_period, self.weights)
+        periods = round(view.decision_interval / view.control_period)
+        return PlanCommand(reference, gains), status, replace(memory, reference=reference.after(periods))

@@ -1,0 +1,148 @@
+"""The ZEM/ZEV loop with its time to go counting down: exact solutions, and the sampled flight.
+
+In t_go, which falls at unit rate, e'' = -(K_R/t_go^2) e - ((K_R - K_V)/t_go) e' + (1 - K_R/2 + K_V) g is
+solved by e = g t_go^2/2 (free fall to rest, no thrust) plus powers t_go^n,
+
+    n^2 - (1 + K_R - K_V) n + K_R = 0.
+
+Speed falls as t_go^(Re n - 1) and thrust as t_go^(Re n - 2): the speed vanishes if every Re n > 1, thrust
+stays bounded if every Re n >= 2. At n = 1 the left side is K_V > 0 and both roots lie above it if
+K_R - K_V > 1; both have a real part of at least 2 if K_V + 3 <= K_R <= 2 K_V + 2.
+
+Held over each period h, the same command moves (e, e') by [1 h; 0 1] and [h^2/2; h] times the acceleration.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from guidance.validation import finite_number
+from studies.zem_zev_loop import Gains
+
+Array = NDArray[np.float64]
+
+
+def flight_powers(gains: Gains) -> NDArray[np.complex128]:
+    """Powers n of the time to go in the exact solutions, shape (2,), the least real part first."""
+    middle = 0.5 * (1.0 + gains.damping)
+    root = np.sqrt(complex(middle**2 - gains.position))
+    if root.imag != 0.0:
+        return np.array([middle - root, middle + root])
+    # the product of the roots is K_R: no cancellation in the smaller
+    return np.array([gains.position / (middle + root), middle + root])
+
+
+def speed_vanishes(gains: Gains) -> bool:
+    """Whether the continuous flight ends at rest whatever its start."""
+    return bool(flight_powers(gains)[0].real > 1.0)
+
+
+def thrust_bounded(gains: Gains) -> bool:
+    """Whether the continuous flight's thrust stays bounded whatever its start."""
+    return bool(flight_powers(gains)[0].real >= 2.0 - 1e-12)
+
+
+@dataclass(frozen=True)
+class Clock:
+    """How the time to go runs down in a sampled flight.
+
+    The command at t_go = (phase + periods - 1 - k) * period, k = 0 ... periods - 1, is held for one period;
+    the engine is cut off once half a period or less is left.
+
+    Attributes:
+        period: [s] over which a thrust is held.
+        periods: commands in the flight.
+        phase: time to go at the last command over the period, in (0.5, 1.5].
+        frozen_below: [s] the gains are those of this time to go once less is left; 0 freezes nothing.
+
+    Raises:
+        ValueError: an attribute is out of range.
+    """
+
+    period: float
+    periods: int
+    phase: float
+    frozen_below: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Check every field."""
+        finite_number("period", self.period, above=0.0)
+        finite_number("periods", self.periods, at_least=1)
+        finite_number("phase", self.phase, above=0.5, at_most=1.5)
+        finite_number("frozen_below", self.frozen_below, at_least=0.0)
+
+    @classmethod
+    def of(cls, time_to_go: float, period: float, frozen_below: float = 0.0) -> Clock:
+        """The clock of a flight that starts with `time_to_go` [s], more than half a period."""
+        finite_number("time_to_go", time_to_go, above=0.5 * period)
+        periods = int(np.ceil(time_to_go / period - 0.5))
+        return cls(period, periods, time_to_go / period - periods + 1.0, frozen_below)
+
+    @property
+    def times_to_go(self) -> Array:
+        """[s] at each command, shape (periods,)."""
+        return self.period * (self.phase + np.arange(self.periods - 1, -1, -1))
+
+
+@dataclass(frozen=True, eq=False)
+class SampledFlight:
+    """A sampled flight up to cut-off; thrust unsaturated, mass constant over each period.
+
+    Attributes:
+        position: [m] shape (periods + 1, axes), relative to the target.
+        velocity: [m/s] shape (periods + 1, axes).
+        acceleration: [m/s^2] shape (periods, axes), commanded thrust over mass.
+    """
+
+    position: Array
+    velocity: Array
+    acceleration: Array
+
+
+def fly_sampled(
+    gains: Gains, clock: Clock, position: ArrayLike, velocity: ArrayLike, gravity: ArrayLike
+) -> SampledFlight:
+    """Fly from `position` [m] relative to the target, `velocity` [m/s] under `gravity` [m/s^2], each (axes,).
+
+    The equations are linear: with no gravity they carry a small deviation from any flight that saturates
+    nothing.
+    """
+    h = clock.period
+    r, v, g = (np.array(value, dtype=np.float64, ndmin=1) for value in (position, velocity, gravity))
+    path, pace, push = [r], [v], []
+    for left in np.maximum(clock.times_to_go, clock.frozen_below):
+        a = -gains.position / left**2 * r - gains.damping / left * v
+        a = a - (0.5 * gains.position - gains.velocity) * g
+        r = r + h * v + 0.5 * h**2 * (a + g)
+        v = v + h * (a + g)
+        path.append(r)
+        pace.append(v)
+        push.append(a)
+    return SampledFlight(np.array(path), np.array(pace), np.array(push))
+
+
+@dataclass(frozen=True)
+class Growth:
+    """What is left at cut-off of a velocity error of 1 m/s, and what it cost.
+
+    Attributes:
+        position: [m] error at cut-off.
+        velocity: [m/s] error at cut-off.
+        thrust: largest correcting acceleration over the first one.
+    """
+
+    position: float
+    velocity: float
+    thrust: float
+
+
+def error_growth(gains: Gains, clock: Clock) -> Growth:
+    """Fly a velocity error of 1 m/s from the clock's first command to cut-off."""
+    flight = fly_sampled(gains, clock, 0.0, 1.0, 0.0)
+    push = np.abs(flight.acceleration[:, 0])
+    return Growth(
+        float(abs(flight.position[-1, 0])), float(abs(flight.velocity[-1, 0])), float(push.max() / push[0])
+    )
