@@ -8,6 +8,7 @@ JGCD 33(4), 2010 (landing error); thrust acceleration is a first-order hold.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,15 +79,16 @@ def start(layout: Layout, scaled: ScaledProblem) -> Rows:
     return Rows("start", "zero", 7, np.arange(7), column, np.ones(7), bound, bound_power=power)
 
 
-def motion(layout: Layout, scaled: ScaledProblem) -> Rows:
-    """Exact motion between nodes under a thrust acceleration linear in time, and the burnt log-mass."""
+@lru_cache(maxsize=64)
+def _motion_entries(layout: Layout) -> dict[str, NDArray]:
+    """Rows of A of `motion`: the same at every solve, by the choice of units."""
     intervals = layout.nodes - 1
     h = 1.0 / intervals
     row = np.arange(intervals * 7).reshape(intervals, 7)
     to_position, to_velocity, to_mass = row[:, :3], row[:, 3:6], row[:, 6]
     position, velocity, acceleration = layout.position, layout.velocity, layout.acceleration
     mass, slack = layout.log_mass, layout.slack
-    entries = _stack(
+    return _stack(
         (to_position, position[1:], 1.0),
         (to_position, position[:-1], -1.0),
         (to_position, velocity[:-1], -h),
@@ -101,8 +103,14 @@ def motion(layout: Layout, scaled: ScaledProblem) -> Rows:
         (to_mass, slack[:-1], h / 2.0),
         (to_mass, slack[1:], h / 2.0),
     )
+
+
+def motion(layout: Layout, scaled: ScaledProblem) -> Rows:
+    """Exact motion between nodes under a thrust acceleration linear in time, and the burnt log-mass."""
+    intervals = layout.nodes - 1
+    h = 1.0 / intervals
     pull = np.concatenate([scaled.gravity * (h * h / 2.0), scaled.gravity * h, [0.0]])
-    return Rows("motion", "zero", 7, bound=np.tile(pull, intervals), **entries)
+    return Rows("motion", "zero", 7, bound=np.tile(pull, intervals), **_motion_entries(layout))
 
 
 def landing(layout: Layout, scaled: ScaledProblem) -> Rows:

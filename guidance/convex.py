@@ -50,12 +50,12 @@ class ConstraintSet:
     @classmethod
     def of(cls, problem: LandingProblem, nodes: int, free_landing_point: bool = False) -> ConstraintSet:
         """The constraint set that `problem` needs."""
-        pointing, glide = problem.lander.pointing_limit, problem.glide_slope_limit
+        pointing = problem.lander.pointing_limit
         return cls(
             nodes,
             problem.lander.min_thrust > 0.0,
             pointing is not None and pointing < np.pi,
-            glide is not None and glide < np.pi / 2 - 1e-6,
+            problem.has_glide_slope,
             problem.speed_limit is not None,
             free_landing_point,
         )

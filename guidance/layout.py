@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,27 +34,27 @@ class Layout:
     def _block(self, first: int, width: int) -> Index:
         return np.arange(self.nodes)[:, None] * _PER_NODE + np.arange(first, first + width)
 
-    @property
+    @cached_property
     def position(self) -> Index:
         """Shape (N, 3)."""
         return self._block(0, 3)
 
-    @property
+    @cached_property
     def velocity(self) -> Index:
         """Shape (N, 3)."""
         return self._block(3, 3)
 
-    @property
+    @cached_property
     def log_mass(self) -> Index:
         """Shape (N,)."""
         return self._block(6, 1)[:, 0]
 
-    @property
+    @cached_property
     def acceleration(self) -> Index:
         """Thrust acceleration, shape (N, 3)."""
         return self._block(7, 3)
 
-    @property
+    @cached_property
     def slack(self) -> Index:
         """Upper bound of the thrust acceleration's magnitude, shape (N,)."""
         return self._block(10, 1)[:, 0]

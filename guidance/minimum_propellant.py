@@ -16,7 +16,7 @@ from guidance.time_window import TimeWindow, guess_time, time_window
 Array = NDArray[np.float64]
 
 _THRUST_TOLERANCE = 5e-4  # relative; half of what a plan promises
-_COARSE_NODES = 16
+_COARSE_NODES = 13
 _NEAR_DEAD_TIME = 0.97  # first steps are small where the guess is good
 _MOST_REFINEMENTS = 8
 SHARE_TOLERANCE = 4e-6

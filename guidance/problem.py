@@ -61,6 +61,11 @@ class LandingProblem:
             finite_number("speed_limit", self.speed_limit, above=0.0)
 
     @property
+    def has_glide_slope(self) -> bool:
+        """Whether the glide slope limit says more than the altitude floor does."""
+        return self.glide_slope_limit is not None and self.glide_slope_limit < math.pi / 2 - 1e-6
+
+    @property
     def offset(self) -> NDArray[np.float64]:
         """[m] shape (3,): the start as seen from the target."""
         return self.state.position - self.target

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from guidance.plan import Plan, PlanStatus
 from guidance.problem import LandingProblem
+from guidance.reference_units import Units
 from guidance.time_window import guess_time, time_window
 
 METHOD = "casadi"
@@ -113,27 +114,7 @@ def _program(nodes: int, pointing: bool, glide: bool, speed: bool) -> _Program:
     return _Program(solver, lower, upper)
 
 
-@dataclass(frozen=True)
-class _Units:
-    length: float
-    acceleration: float
-
-    @classmethod
-    def of(cls, problem: LandingProblem) -> _Units:
-        acceleration = problem.lander.max_thrust / problem.state.mass
-        speed = float(np.linalg.norm(problem.state.velocity))
-        return cls(max(float(np.linalg.norm(problem.offset)), speed**2 / acceleration, 1e-3), acceleration)
-
-    @property
-    def time(self) -> float:
-        return math.sqrt(self.length / self.acceleration)
-
-    @property
-    def speed(self) -> float:
-        return math.sqrt(self.length * self.acceleration)
-
-
-def _parameters(problem: LandingProblem, units: _Units) -> Array:
+def _parameters(problem: LandingProblem, units: Units) -> Array:
     lander = problem.lander
     return np.concatenate(
         [
@@ -148,7 +129,7 @@ def _parameters(problem: LandingProblem, units: _Units) -> Array:
     )
 
 
-def _pack(units: _Units, problem: LandingProblem, flight: dict[str, Array]) -> Array:
+def _pack(units: Units, problem: LandingProblem, flight: dict[str, Array]) -> Array:
     """Decision vector of a trajectory in SI."""
     mass = flight["mass"]
     return np.concatenate(
@@ -162,7 +143,7 @@ def _pack(units: _Units, problem: LandingProblem, flight: dict[str, Array]) -> A
     )
 
 
-def _unpack(units: _Units, problem: LandingProblem, decision: Array, nodes: int) -> dict[str, Array]:
+def _unpack(units: Units, problem: LandingProblem, decision: Array, nodes: int) -> dict[str, Array]:
     position, velocity, push = (
         decision[3 * nodes * k : 3 * nodes * (k + 1)].reshape(nodes, 3, order="F") for k in range(3)
     )
@@ -227,10 +208,9 @@ def plan_casadi(
     window = time_window(problem)
     if window.empty and time_of_flight is None:
         return Plan(PlanStatus.INFEASIBLE, problem, METHOD, message=window.cause)
-    units = _Units.of(problem)
-    pointing, glide = problem.lander.pointing_limit, problem.glide_slope_limit
-    limited = glide is not None and glide < math.pi / 2 - 1e-6
-    program = _program(nodes, pointing is not None, limited, problem.speed_limit is not None)
+    units = Units.of(problem)
+    pointing = problem.lander.pointing_limit is not None
+    program = _program(nodes, pointing, problem.has_glide_slope, problem.speed_limit is not None)
     if guess is not None and guess.nodes:
         start = _resample(problem, guess, nodes)
     else:

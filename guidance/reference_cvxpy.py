@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from guidance.plan import Plan, PlanStatus
 from guidance.problem import LandingProblem
+from guidance.reference_units import Units
 from guidance.time_window import time_window
 
 METHOD = "cvxpy"
@@ -30,32 +31,6 @@ _GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 _TIME_TOLERANCE = 2e-3  # relative; the optimum is flat in time
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Units:
-    """Length, speed and acceleration of one: set by the start alone."""
-
-    length: float
-    acceleration: float
-
-    @classmethod
-    def of(cls, problem: LandingProblem) -> Units:
-        """Units in which start and thrust are of size one."""
-        acceleration = problem.lander.max_thrust / problem.state.mass
-        speed = float(np.linalg.norm(problem.state.velocity))
-        length = max(float(np.linalg.norm(problem.offset)), speed**2 / acceleration, 1e-3)
-        return cls(length, acceleration)
-
-    @property
-    def time(self) -> float:
-        """[s]."""
-        return math.sqrt(self.length / self.acceleration)
-
-    @property
-    def speed(self) -> float:
-        """[m/s]."""
-        return math.sqrt(self.length * self.acceleration)
 
 
 @lru_cache(maxsize=8)
@@ -109,11 +84,10 @@ def _model(nodes: int, limits: tuple[bool, bool, bool, bool]) -> tuple[Any, dict
 
 
 def _limits(problem: LandingProblem) -> tuple[bool, bool, bool, bool]:
-    glide = problem.glide_slope_limit
     return (
         problem.lander.min_thrust > 0.0,
         problem.lander.pointing_limit is not None,
-        glide is not None and glide < math.pi / 2 - 1e-6,
+        problem.has_glide_slope,
         problem.speed_limit is not None,
     )
 
