@@ -10,7 +10,7 @@ import numpy as np
 
 from hda.scenario import Preset
 from studies.figures import COLORS
-from studies.stability import POSITION_GAINS, VELOCITY_GAINS, Stability, descend
+from studies.stability_sweep import POSITION_GAINS, VELOCITY_GAINS, Requirement, descend
 from studies.zem_zev_flight import flight_powers
 from studies.zem_zev_loop import Gains, closed_margins, least_safe_time, sampled_margins, stable_above
 
@@ -22,17 +22,21 @@ _SHOWN = (Gains(6.0, 2.0), Gains(5.0, 1.0), Gains(7.0, 1.0), Gains(5.0, 3.0), Ga
 _POINTS = 33
 
 
-def draw_stability(path: Path, preset: Preset, options: Stability) -> None:
+def draw_stability(path: Path, preset: Preset, required: Requirement) -> None:
     """Draw and save the figure."""
     from matplotlib.figure import Figure
 
     period = preset.rules.control_period
-    phase = math.radians(options.phase_margin)
     box = [
         [Gains(float(p), float(v)) for p in np.linspace(*POSITION_GAINS, _POINTS)]
         for v in np.linspace(*VELOCITY_GAINS, _POINTS)
     ]
-    safe = np.array([[least_safe_time(g, period, phase, options.gain_margin) for g in row] for row in box])
+    safe = np.array(
+        [
+            [least_safe_time(g, period, required.phase_margin, required.gain_margin) for g in row]
+            for row in box
+        ]
+    )
     powers = np.array([[flight_powers(g)[0].real for g in row] for row in box])
     free = np.array([[descend(g, preset, 0.0)[0].max() for g in row] for row in box])
     held = np.array(
@@ -44,15 +48,15 @@ def draw_stability(path: Path, preset: Preset, options: Stability) -> None:
     figure = Figure(figsize=(16, 9), layout="constrained")
     axes = figure.subplots(2, 3)
     _draw_map(axes[0, 0], powers, "least Re n; bounded thrust above 2", (1.25, 1.5, 1.75, 2.0, 2.25, 2.5))
-    _draw_margins(axes[0, 1], period, options)
+    _draw_margins(axes[0, 1], period, required)
     _draw_map(axes[0, 2], safe, "time to go above which margins are met [s]", (1.5, 1.75, 2.0, 2.5, 3.0))
     speeds = (0.5, preset.rules.soft_speed, preset.rules.crash_speed, 10.0, 20.0, 50.0)
     _draw_map(axes[1, 0], free, "worst touchdown speed, mean descent [m/s]", speeds)
     _draw_map(axes[1, 1], held, "the same, gains frozen where margins end [m/s]", speeds)
     _draw_delay(axes[1, 2], period)
     figure.suptitle(
-        f"ZEM/ZEV, control period {period:g} s; margins: {options.phase_margin:g} deg and a factor "
-        f"{options.gain_margin:g}; worst over the phase of the clock; no thrust limit"
+        f"ZEM/ZEV, control period {period:g} s; margins: {math.degrees(required.phase_margin):g} deg and a "
+        f"factor {required.gain_margin:g}; worst over the phase of the clock; no thrust limit"
     )
     figure.savefig(path, dpi=110)
 
@@ -77,7 +81,7 @@ def _draw_map(axis: Axes, values: NDArray[np.float64], title: str, levels: tuple
     axis.legend(loc="lower left")
 
 
-def _draw_margins(axis: Axes, period: float, options: Stability) -> None:
+def _draw_margins(axis: Axes, period: float, required: Requirement) -> None:
     times = np.geomspace(0.5 * period, 80.0, 400)
     for color, gains in zip(COLORS, _SHOWN, strict=False):
         margins = [math.degrees(sampled_margins(gains, float(t), period).phase_margin) for t in times]
@@ -85,7 +89,7 @@ def _draw_margins(axis: Axes, period: float, options: Stability) -> None:
         held = math.degrees(closed_margins(gains, 1.0).phase_margin)
         axis.axhline(held, color=color, linestyle=":", linewidth=1.0)
         axis.axvline(stable_above(gains, period), color=color, linestyle="--", linewidth=0.7)
-    axis.axhline(options.phase_margin, color="0.4", linewidth=0.8)
+    axis.axhline(math.degrees(required.phase_margin), color="0.4", linewidth=0.8)
     axis.set_ylim(0.0, 90.0)
     axis.set_xlabel("time to go [s]")
     axis.set_ylabel("phase margin [deg]")

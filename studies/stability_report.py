@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hda.scenario import Preset
+from studies.stability_sweep import (
+    POSITION_GAINS,
+    VELOCITY_GAINS,
+    GainRow,
+    MarginRow,
+    Requirement,
+    mean_descent,
+)
 from studies.zem_zev_flight import thrust_bounded
-from studies.zem_zev_loop import stable_above
-
-if TYPE_CHECKING:
-    from studies.stability import GainRow, MarginRow, Stability
+from studies.zem_zev_loop import Gains, stable_above
 
 _FINE = 201
 
 
 def conclude(
-    margins: Sequence[MarginRow], gains: Sequence[GainRow], preset: Preset, options: Stability
+    margins: Sequence[MarginRow], gains: Sequence[GainRow], preset: Preset, required: Requirement
 ) -> list[str]:
     """Sentences about the whole box, each from the rows."""
     return [
@@ -26,7 +31,7 @@ def conclude(
         _exact(gains, preset),
         _thrust(gains),
         _held(gains, preset),
-        _sampled(gains, preset, options),
+        _sampled(gains, preset, required),
         _descent(gains, preset),
         _freezing(gains, preset),
     ]
@@ -54,18 +59,17 @@ def _agreement(rows: Sequence[MarginRow]) -> str:
 def _exact(rows: Sequence[GainRow], preset: Preset) -> str:
     vanishing = sum(r.speed_vanishes for r in rows)
     slow = min(rows, key=lambda r: r.power_1_real)
-    share = (0.5 * preset.rules.control_period / 40.0) ** (slow.power_1_real - 1.0)
+    start = mean_descent(preset)[2]
+    share = (0.5 * preset.rules.control_period / start) ** (slow.power_1_real - 1.0)
     return (
-        f"Exact continuous loop: the speed vanishes at touchdown for {vanishing} of {len(rows)} pairs, but as "
-        f"t_go^{slow.power_1_real - 1.0:.2f} at {_pairs([slow])}: cut off at half a period, its slow solution "
-        f"keeps {100.0 * share:.0f} % of the speed it had at 40 s. Small K_V leaves a residual speed."
+        f"Exact continuous loop: the speed vanishes at touchdown for {vanishing} of {len(rows)} pairs, but "
+        f"as t_go^{slow.power_1_real - 1.0:.2f} at {_pairs([slow])}: cut off at half a period, its slow "
+        f"solution keeps {100.0 * share:.0f} % of the speed it had at {start:.0f} s. Small K_V "
+        "leaves a residual speed."
     )
 
 
 def _thrust(rows: Sequence[GainRow]) -> str:
-    from studies.stability import POSITION_GAINS, VELOCITY_GAINS
-    from studies.zem_zev_loop import Gains
-
     grid = [
         thrust_bounded(Gains(float(p), float(v)))
         for p in np.linspace(*POSITION_GAINS, _FINE)
@@ -88,14 +92,12 @@ def _held(rows: Sequence[GainRow], preset: Preset) -> str:
     )
 
 
-def _sampled(rows: Sequence[GainRow], preset: Preset, options: Stability) -> str:
-    from studies.zem_zev_loop import Gains
-
+def _sampled(rows: Sequence[GainRow], preset: Preset, required: Requirement) -> str:
     return (
         f"Sampled every {preset.rules.control_period:g} s the loop is stable only above a time to go of "
         f"h max(D/2, K_R/2D), D = K_R - K_V: {_range(rows, lambda r: r.sampled_stable_above_s, '.2f')} s "
         f"({stable_above(Gains(6.0, 2.0), preset.rules.control_period):.2f} s for 6/2), and keeps "
-        f"{options.phase_margin:g} deg and a factor {options.gain_margin:g} above "
+        f"{math.degrees(required.phase_margin):g} deg and a factor {required.gain_margin:g} above "
         f"{_range(rows, lambda r: r.margins_met_above_s, '.2f')} s. Every pair of the box is safe with more "
         f"time left than {max(r.margins_met_above_s for r in rows):.2f} s."
     )
@@ -134,8 +136,8 @@ def _freezing(rows: Sequence[GainRow], preset: Preset) -> str:
     standard = [r for r in rows if (r.position_gain, r.velocity_gain) == (6.0, 2.0)]
     for r in standard:
         text += (
-            f" For 6/2: {r.touchdown_speed_mps_max:.2f} m/s unfrozen, {r.frozen_at_stable_mps_max:.2f} frozen "
-            f"below {r.sampled_stable_above_s:.2f} s, {r.frozen_at_margins_mps_max:.2f} below "
+            f" For 6/2: {r.touchdown_speed_mps_max:.2f} m/s unfrozen, {r.frozen_at_stable_mps_max:.2f} "
+            f"frozen below {r.sampled_stable_above_s:.2f} s, {r.frozen_at_margins_mps_max:.2f} below "
             f"{r.margins_met_above_s:.2f} s."
         )
     return text

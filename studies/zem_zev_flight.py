@@ -55,7 +55,8 @@ class Clock:
     Attributes:
         period: [s] over which a thrust is held.
         periods: commands in the flight.
-        phase: time to go at the last command over the period, in (0.5, 1.5].
+        phase: time to go at the last command over the period, in (0.5, 1.5]; a number, or shape (flights,)
+            for as many flights at once.
         frozen_below: [s] the gains are those of this time to go once less is left; 0 freezes nothing.
 
     Raises:
@@ -64,14 +65,16 @@ class Clock:
 
     period: float
     periods: int
-    phase: float
+    phase: ArrayLike
     frozen_below: float = 0.0
 
     def __post_init__(self) -> None:
         """Check every field."""
         finite_number("period", self.period, above=0.0)
         finite_number("periods", self.periods, at_least=1)
-        finite_number("phase", self.phase, above=0.5, at_most=1.5)
+        phase = np.array(self.phase, dtype=np.float64)
+        if not np.all((phase > 0.5) & (phase <= 1.5)):
+            raise ValueError(f"phase must be above 0.5 and at most 1.5, got {self.phase!r}")
         finite_number("frozen_below", self.frozen_below, at_least=0.0)
 
     @classmethod
@@ -83,13 +86,17 @@ class Clock:
 
     @property
     def times_to_go(self) -> Array:
-        """[s] at each command, shape (periods,)."""
-        return self.period * (self.phase + np.arange(self.periods - 1, -1, -1))
+        """[s] at each command, shape (periods,), or (periods, flights)."""
+        phase = np.asarray(self.phase, dtype=np.float64)
+        later = np.arange(self.periods - 1.0, -1.0, -1.0)
+        return self.period * np.add.outer(later, phase)
 
 
 @dataclass(frozen=True, eq=False)
 class SampledFlight:
     """A sampled flight up to cut-off; thrust unsaturated, mass constant over each period.
+
+    Where the clock holds several phases, an axis of flights follows the first.
 
     Attributes:
         position: [m] shape (periods + 1, axes), relative to the target.
@@ -111,9 +118,11 @@ def fly_sampled(
     nothing.
     """
     h = clock.period
-    r, v, g = (np.array(value, dtype=np.float64, ndmin=1) for value in (position, velocity, gravity))
+    times = np.maximum(clock.times_to_go, clock.frozen_below)[..., None]
+    start = (np.array(value, dtype=np.float64, ndmin=1) for value in (position, velocity, gravity))
+    r, v, g = (np.broadcast_to(value, (*times.shape[1:-1], value.size)) for value in start)
     path, pace, push = [r], [v], []
-    for left in np.maximum(clock.times_to_go, clock.frozen_below):
+    for left in times:
         a = -gains.position / left**2 * r - gains.damping / left * v
         a = a - (0.5 * gains.position - gains.velocity) * g
         r = r + h * v + 0.5 * h**2 * (a + g)
@@ -122,6 +131,34 @@ def fly_sampled(
         pace.append(v)
         push.append(a)
     return SampledFlight(np.array(path), np.array(pace), np.array(push))
+
+
+def touchdown_speed(flight: SampledFlight, period: float, gravity: ArrayLike) -> Array:
+    """Speed [m/s] at the first crossing of the target's plane, after cut-off in free fall.
+
+    Args:
+        flight: axes x, y, z; starts above the plane.
+        period: [s] over which thrust was held.
+        gravity: [m/s^2] shape (3,), pointing down.
+
+    Returns:
+        One speed, shape (), or one for each flight.
+    """
+    pull = np.asarray(gravity, dtype=np.float64)
+    held = np.diff(flight.velocity, axis=0) / period
+    force = np.concatenate([held, np.broadcast_to(pull, (1, *held.shape[1:]))])
+    longest = np.full(flight.position.shape[:-1], period)
+    longest[-1] = np.inf
+    height, climb, lift = flight.position[..., 2], flight.velocity[..., 2], force[..., 2]
+    square = climb**2 - 2.0 * lift * height
+    pace = np.sqrt(np.maximum(square, 0.0)) - climb
+    crossing = np.divide(2.0 * height, pace, out=np.full_like(pace, np.inf), where=pace > 0.0)
+    crosses = (square >= 0.0) & (crossing <= longest) & np.isfinite(crossing)
+    first = crosses.argmax(axis=0)[None]
+    time = np.take_along_axis(crossing, first, axis=0)
+    velocity = np.take_along_axis(flight.velocity, first[..., None], axis=0)
+    velocity = velocity + np.take_along_axis(force, first[..., None], axis=0) * time[..., None]
+    return np.linalg.norm(velocity[0], axis=-1)
 
 
 @dataclass(frozen=True)
@@ -140,9 +177,11 @@ class Growth:
 
 
 def error_growth(gains: Gains, clock: Clock) -> Growth:
-    """Fly a velocity error of 1 m/s from the clock's first command to cut-off."""
+    """Fly a velocity error of 1 m/s from the clock's first command to cut-off; worst of the phases."""
     flight = fly_sampled(gains, clock, 0.0, 1.0, 0.0)
-    push = np.abs(flight.acceleration[:, 0])
+    push = np.abs(flight.acceleration)
     return Growth(
-        float(abs(flight.position[-1, 0])), float(abs(flight.velocity[-1, 0])), float(push.max() / push[0])
+        float(np.abs(flight.position[-1]).max()),
+        float(np.abs(flight.velocity[-1]).max()),
+        float((push.max(axis=0) / push[0]).max()),
     )
