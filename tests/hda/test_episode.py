@@ -269,7 +269,7 @@ def test_the_outcome_is_judged_on_the_true_map_at_the_touchdown_cell(records):
 
 def test_an_episode_that_never_lands_is_truncated_after_the_last_decision(scenarios):
     """Overdamped gains on a clock that never runs down: it comes ever nearer and never arrives."""
-    creep = Answering(lambda o: (Decision(o.target, ZemZevCommand(20.0, 9.0, 30.0)), None))
+    creep = Answering(lambda o: (Decision(o.target, ZemZevCommand(20.0, 9.0, 60.0)), None))
     assert fly(creep, scenarios[0]).outcome.ending is Ending.TANK_EMPTY
     start = scenarios[0].initial_state
     full = replace(scenarios[0], initial_state=State(start.position, start.velocity, 1400.0))
@@ -279,7 +279,7 @@ def test_an_episode_that_never_lands_is_truncated_after_the_last_decision(scenar
     assert record.time[-1] == pytest.approx(100.0)
     assert not record.outcome.safe_site
     assert not record.outcome.success
-    assert 50.0 < record.position[-1, 2] < 60.0
+    assert 50.0 < record.position[-1, 2] < 120.0
     assert [r.safety for r in record.rewards] == [0.0] * 19 + [-1.0]
     assert record.rewards[-1].failure == 0.0
 
