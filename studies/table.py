@@ -158,7 +158,7 @@ def print_table(summaries: Sequence[PolicySummary]) -> None:
     first = summaries[0]
     title = f"preset {first.preset}, {first.episodes} episodes (mean, 95 % interval; [] clustered by tile)"
     table = Table(title=title)
-    table.add_column("policy")
+    table.add_column("policy", no_wrap=True)
     headings = ("safe site %", "success %", "p", "miss m", "speed m/s", "prop. %", "slant deg", "thrust N")
     for heading in (*headings, "reward", "fallb."):
         table.add_column(heading, justify="right")
