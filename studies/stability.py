@@ -76,14 +76,14 @@ def write_rows(path: Path, rows: Sequence[Any]) -> None:
 def print_gains(rows: Sequence[GainRow], preset: Preset) -> None:
     """Print one line per pair of gains."""
     period = preset.rules.control_period
-    table = Table(title=f"ZEM/ZEV, control period {period:g} s; speeds: median / worst clock phase")
+    table = Table(title=f"ZEM/ZEV, control period {period:g} s; speeds in m/s, median / worst clock phase")
     headings = ("K_R", "K_V", "powers of t_go", "thrust", "phase margin", "delay / t_go")
-    ends = ("stable above", "margins above", "touchdown m/s", "frozen at stable", "frozen at margins")
+    ends = ("stable above", "margins above", "speed left", "frozen: stable", "margins", "touchdown")
     for heading in (*headings, *ends):
         table.add_column(heading, justify="right")
     for r in rows:
         if r.power_imaginary > 0.0:
-            powers = f"{r.power_1_real:.2f} +- {r.power_imaginary:.2f}j"
+            powers = f"{r.power_1_real:.2f}+-{r.power_imaginary:.2f}j"
         else:
             powers = f"{r.power_1_real:.2f}, {r.power_2_real:.2f}"
         table.add_row(
@@ -95,11 +95,12 @@ def print_gains(rows: Sequence[GainRow], preset: Preset) -> None:
             f"{r.delay_margin_over_time_to_go:.3f}",
             f"{r.sampled_stable_above_s:.2f} s",
             f"{r.margins_met_above_s:.2f} s",
-            f"{r.touchdown_speed_mps_median:.2f} / {r.touchdown_speed_mps_max:.2f}",
+            f"{r.residual_speed_mps_median:.2f} / {r.residual_speed_mps_max:.2f}",
             f"{r.frozen_at_stable_mps_median:.2f} / {r.frozen_at_stable_mps_max:.2f}",
             f"{r.frozen_at_margins_mps_median:.2f} / {r.frozen_at_margins_mps_max:.2f}",
+            f"{r.touchdown_speed_mps_max:.1f}, {r.touchdown_time_to_go_s_max:.1f} s",
         )
-    Console(width=max(Console().width, 146)).print(table)
+    Console(width=max(Console().width, 160)).print(table)
 
 
 def study_stability(options: Stability) -> tuple[list[MarginRow], list[GainRow]]:

@@ -38,10 +38,10 @@ def draw_stability(path: Path, preset: Preset, required: Requirement) -> None:
         ]
     )
     powers = np.array([[flight_powers(g)[0].real for g in row] for row in box])
-    free = np.array([[descend(g, preset, 0.0)[0].max() for g in row] for row in box])
+    free = np.array([[descend(g, preset, 0.0).residual.max() for g in row] for row in box])
     held = np.array(
         [
-            [descend(g, preset, float(time))[0].max() for g, time in zip(row, times, strict=True)]
+            [descend(g, preset, float(time)).residual.max() for g, time in zip(row, times, strict=True)]
             for row, times in zip(box, safe, strict=True)
         ]
     )
@@ -51,9 +51,10 @@ def draw_stability(path: Path, preset: Preset, required: Requirement) -> None:
     _draw_margins(axes[0, 1], period, required)
     _draw_map(axes[0, 2], safe, "time to go above which margins are met [s]", (1.5, 1.75, 2.0, 2.5, 3.0))
     speeds = (0.5, preset.rules.soft_speed, preset.rules.crash_speed, 10.0, 20.0, 50.0)
-    _draw_map(axes[1, 0], free, "worst touchdown speed, mean descent [m/s]", speeds)
+    _draw_map(axes[1, 0], free, "worst speed left at cut-off, mean descent [m/s]", speeds)
     _draw_map(axes[1, 1], held, "the same, gains frozen where margins end [m/s]", speeds)
-    _draw_delay(axes[1, 2], period)
+    strikes = np.array([[descend(g, preset, 0.0).time_left.max() for g in row] for row in box])
+    _draw_map(axes[1, 2], strikes, "worst time to go at which the plane is met [s]", (0.25, 1.0, 5.0, 10.0))
     figure.suptitle(
         f"ZEM/ZEV, control period {period:g} s; margins: {math.degrees(required.phase_margin):g} deg and a "
         f"factor {required.gain_margin:g}; worst over the phase of the clock; no thrust limit"
@@ -95,18 +96,4 @@ def _draw_margins(axis: Axes, period: float, required: Requirement) -> None:
     axis.set_ylabel("phase margin [deg]")
     axis.set_title("sampled (solid), continuous (dotted); dashed: stable to the right", fontsize="medium")
     axis.legend(loc="lower right", title="K_R/K_V")
-    axis.grid(alpha=0.25)
-
-
-def _draw_delay(axis: Axes, period: float) -> None:
-    times = np.geomspace(0.5 * period, 80.0, 400)
-    for color, gains in zip(COLORS, _SHOWN, strict=False):
-        ratio = closed_margins(gains, 1.0).delay_margin
-        axis.loglog(times, ratio * times, color=color, label=f"{gains.position:g}/{gains.velocity:g}")
-    axis.axhline(0.5 * period, color="0.4", linewidth=0.8)
-    axis.text(times[-1], 0.5 * period, "mean delay of the hold", ha="right", va="bottom")
-    axis.set_xlabel("time to go [s]")
-    axis.set_ylabel("delay margin [s]")
-    axis.set_title("delay margin, time to go held", fontsize="medium")
-    axis.legend(loc="upper left", title="K_R/K_V")
     axis.grid(alpha=0.25)

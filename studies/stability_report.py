@@ -34,6 +34,7 @@ def conclude(
         _sampled(gains, preset, required),
         _descent(gains, preset),
         _freezing(gains, preset),
+        _overshoot(gains, preset),
     ]
 
 
@@ -104,13 +105,28 @@ def _sampled(rows: Sequence[GainRow], preset: Preset, required: Requirement) -> 
 
 
 def _descent(rows: Sequence[GainRow], preset: Preset) -> str:
-    soft, crash = preset.rules.soft_speed, preset.rules.crash_speed
-    gentle = [r for r in rows if r.touchdown_speed_mps_max <= soft]
-    hard = [r for r in rows if r.touchdown_speed_mps_max > crash]
+    soft = preset.rules.soft_speed
+    gentle = [r for r in rows if r.residual_speed_mps_max <= soft]
     return (
         f"Mean descent of preset {preset.name}, gains in force to the last command, no thrust limit, worst "
-        f"clock phase: touchdown within {soft:g} m/s for {_pairs(gentle)}; above {crash:g} m/s for "
-        f"{_pairs(hard)}."
+        f"clock phase: at most {soft:g} m/s are left at cut-off for {_pairs(gentle)}."
+    )
+
+
+def _overshoot(rows: Sequence[GainRow], preset: Preset) -> str:
+    late = 1.5 * preset.rules.control_period
+    early = [r for r in rows if r.touchdown_time_to_go_s_max > late]
+    gentle = [r for r in rows if r.touchdown_speed_mps_max <= preset.rules.soft_speed]
+    text = f"Touchdown within {preset.rules.soft_speed:g} m/s on that descent: {_pairs(gentle)}."
+    if not early:
+        return text
+    complex_powers = sum(r.power_imaginary > 0.0 for r in early)
+    return text + (
+        f" {len(early)} pairs, {complex_powers} of them with complex powers, swing through the plane before "
+        f"the last command, at {_range(early, lambda r: r.touchdown_speed_mps_max, '.1f')} m/s with "
+        f"{_range(early, lambda r: r.touchdown_time_to_go_s_max, '.1f')} s to go: {_pairs(early)}. "
+        "Complex powers swing about zero: such gains cannot be held for a whole flight, frozen at its end or "
+        "not."
     )
 
 
@@ -118,15 +134,15 @@ def _freezing(rows: Sequence[GainRow], preset: Preset) -> str:
     soft = preset.rules.soft_speed
     oscillating = [r for r in rows if r.power_imaginary > 0.0]
     slow = [r for r in rows if r.power_imaginary == 0.0]
-    saved = [r for r in rows if r.frozen_at_margins_mps_max <= soft < r.touchdown_speed_mps_max]
-    lost = [r for r in rows if r.touchdown_speed_mps_max <= soft < r.frozen_at_margins_mps_max]
+    saved = [r for r in rows if r.frozen_at_margins_mps_max <= soft < r.residual_speed_mps_max]
+    lost = [r for r in rows if r.residual_speed_mps_max <= soft < r.frozen_at_margins_mps_max]
 
     def helped(group: Sequence[GainRow], name: str) -> str:
-        count = sum(getattr(r, name) < r.touchdown_speed_mps_max for r in group)
+        count = sum(getattr(r, name) < r.residual_speed_mps_max for r in group)
         return f"{count} of {len(group)}"
 
     text = (
-        "Gains frozen lower the worst touchdown speed of the pairs with complex powers in "
+        "Gains frozen lower the worst speed at cut-off of the pairs with complex powers in "
         f"{helped(oscillating, 'frozen_at_margins_mps_max')} cases (frozen where the margins end) and "
         f"{helped(oscillating, 'frozen_at_stable_mps_max')} (frozen where stability ends), of the pairs with "
         f"real powers in {helped(slow, 'frozen_at_margins_mps_max')} and "
@@ -136,7 +152,7 @@ def _freezing(rows: Sequence[GainRow], preset: Preset) -> str:
     standard = [r for r in rows if (r.position_gain, r.velocity_gain) == (6.0, 2.0)]
     for r in standard:
         text += (
-            f" For 6/2: {r.touchdown_speed_mps_max:.2f} m/s unfrozen, {r.frozen_at_stable_mps_max:.2f} "
+            f" For 6/2: {r.residual_speed_mps_max:.2f} m/s unfrozen, {r.frozen_at_stable_mps_max:.2f} "
             f"frozen below {r.sampled_stable_above_s:.2f} s, {r.frozen_at_margins_mps_max:.2f} below "
             f"{r.margins_met_above_s:.2f} s."
         )

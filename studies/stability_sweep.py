@@ -17,7 +17,7 @@ from studies.zem_zev_flight import (
     fly_sampled,
     speed_vanishes,
     thrust_bounded,
-    touchdown_speed,
+    touch_down,
 )
 from studies.zem_zev_loop import (
     Gains,
@@ -77,7 +77,12 @@ class MarginRow:
 
 @dataclass(frozen=True)
 class GainRow:
-    """One pair of gains over a whole flight; `frozen` and `safe`: gains held below that time to go."""
+    """One pair of gains over the mean descent of the preset, median and worst over the clock's phase.
+
+    `residual_speed` is left at cut-off, `frozen` with the gains held below the time to go at which stability
+    or the required margins end; all three pass through the plane. Touchdown is where the plane is first
+    met, and the time to go that is left there.
+    """
 
     position_gain: float
     velocity_gain: float
@@ -90,12 +95,14 @@ class GainRow:
     delay_margin_over_time_to_go: float
     sampled_stable_above_s: float
     margins_met_above_s: float
-    touchdown_speed_mps_median: float
-    touchdown_speed_mps_max: float
+    residual_speed_mps_median: float
+    residual_speed_mps_max: float
     frozen_at_stable_mps_median: float
     frozen_at_stable_mps_max: float
     frozen_at_margins_mps_median: float
     frozen_at_margins_mps_max: float
+    touchdown_speed_mps_max: float
+    touchdown_time_to_go_s_max: float
     maximum_thrust_n: float
     maximum_thrust_frozen_n: float
 
@@ -153,21 +160,37 @@ def mean_descent(preset: Preset) -> tuple[np.ndarray, np.ndarray, float]:
     return position, velocity, time_to_go(state, np.zeros(3), preset.gravity)
 
 
-def descend(gains: Gains, preset: Preset, frozen_below: float) -> tuple[np.ndarray, float]:
-    """Fly the mean descent at every phase of the clock.
+@dataclass(frozen=True, eq=False)
+class Descent:
+    """The mean descent at every phase of the clock; no thrust limit.
 
-    Returns:
-        Touchdown speed [m/s] per phase and the largest thrust [N],
-        unsaturated.
+    Attributes:
+        residual: [m/s] speed at cut-off, wherever that is, shape (phases,).
+        touchdown: [m/s] speed where the plane is first met, shape (phases,).
+        time_left: [s] time to go there, negative after cut-off, shape (phases,).
+        thrust: [N] the largest.
     """
+
+    residual: np.ndarray
+    touchdown: np.ndarray
+    time_left: np.ndarray
+    thrust: float
+
+
+def descend(gains: Gains, preset: Preset, frozen_below: float) -> Descent:
+    """Fly the mean descent of a preset, the gains held once less than `frozen_below` [s] is left."""
     position, velocity, time = mean_descent(preset)
     period = preset.rules.control_period
     gravity = np.array(preset.gravity)
     clock = Clock(period, round(time / period), _PHASES, frozen_below)
     flight = fly_sampled(gains, clock, position, velocity, gravity)
-    speeds = touchdown_speed(flight, period, gravity)
-    push = float(np.linalg.norm(flight.acceleration, axis=-1).max())
-    return speeds, push * preset.start.mass.high
+    touchdown, flown = touch_down(flight, period, gravity)
+    return Descent(
+        np.linalg.norm(flight.velocity[-1], axis=-1),
+        touchdown,
+        clock.times_to_go[0] - flown,
+        float(np.linalg.norm(flight.acceleration, axis=-1).max()) * preset.start.mass.high,
+    )
 
 
 def gain_row(gains: Gains, preset: Preset, required: Requirement) -> GainRow:
@@ -177,9 +200,9 @@ def gain_row(gains: Gains, preset: Preset, required: Requirement) -> GainRow:
     loop = closed_margins(gains, 1.0)
     stable = stable_above(gains, period)
     safe = least_safe_time(gains, period, required.phase_margin, required.gain_margin)
-    free, thrust = descend(gains, preset, 0.0)
-    at_stable, thrust_frozen = descend(gains, preset, stable)
-    at_margins, _ = descend(gains, preset, safe)
+    free = descend(gains, preset, 0.0)
+    at_stable = descend(gains, preset, stable)
+    at_margins = descend(gains, preset, safe)
     return GainRow(
         gains.position,
         gains.velocity,
@@ -192,12 +215,14 @@ def gain_row(gains: Gains, preset: Preset, required: Requirement) -> GainRow:
         loop.delay_margin,
         stable,
         safe,
-        float(np.median(free)),
-        float(np.max(free)),
-        float(np.median(at_stable)),
-        float(np.max(at_stable)),
-        float(np.median(at_margins)),
-        float(np.max(at_margins)),
-        thrust,
-        thrust_frozen,
+        float(np.median(free.residual)),
+        float(np.max(free.residual)),
+        float(np.median(at_stable.residual)),
+        float(np.max(at_stable.residual)),
+        float(np.median(at_margins.residual)),
+        float(np.max(at_margins.residual)),
+        float(np.max(free.touchdown)),
+        float(np.max(free.time_left)),
+        free.thrust,
+        at_stable.thrust,
     )

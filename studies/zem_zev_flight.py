@@ -133,8 +133,8 @@ def fly_sampled(
     return SampledFlight(np.array(path), np.array(pace), np.array(push))
 
 
-def touchdown_speed(flight: SampledFlight, period: float, gravity: ArrayLike) -> Array:
-    """Speed [m/s] at the first crossing of the target's plane, after cut-off in free fall.
+def touch_down(flight: SampledFlight, period: float, gravity: ArrayLike) -> tuple[Array, Array]:
+    """First crossing of the target's plane; after cut-off in free fall.
 
     Args:
         flight: axes x, y, z; starts above the plane.
@@ -142,7 +142,7 @@ def touchdown_speed(flight: SampledFlight, period: float, gravity: ArrayLike) ->
         gravity: [m/s^2] shape (3,), pointing down.
 
     Returns:
-        One speed, shape (), or one for each flight.
+        Speed [m/s] and time since the start [s], each of shape (), or one for each flight.
     """
     pull = np.asarray(gravity, dtype=np.float64)
     held = np.diff(flight.velocity, axis=0) / period
@@ -158,7 +158,7 @@ def touchdown_speed(flight: SampledFlight, period: float, gravity: ArrayLike) ->
     time = np.take_along_axis(crossing, first, axis=0)
     velocity = np.take_along_axis(flight.velocity, first[..., None], axis=0)
     velocity = velocity + np.take_along_axis(force, first[..., None], axis=0) * time[..., None]
-    return np.linalg.norm(velocity[0], axis=-1)
+    return np.linalg.norm(velocity[0], axis=-1), (first * period + time)[0]
 
 
 @dataclass(frozen=True)

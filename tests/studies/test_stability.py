@@ -22,7 +22,7 @@ from studies.zem_zev_flight import (
     fly_sampled,
     speed_vanishes,
     thrust_bounded,
-    touchdown_speed,
+    touch_down,
 )
 from studies.zem_zev_loop import (
     Gains,
@@ -211,15 +211,16 @@ def test_sampled_flight_against_the_vehicle(gains: Gains, time: float) -> None:
     assert pushed == pytest.approx(ours.acceleration[: nodes - 1], abs=scale)
 
 
-def test_mean_descent_touches_down_as_the_vehicle_does() -> None:
-    """The whole mean descent of `paper` at 6/2: the vehicle's touchdown speed, mass change and all."""
+@pytest.mark.parametrize("gains", [Gains(6.0, 2.0), Gains(6.5, 2.0), Gains(6.0, 2.5), Gains(7.0, 3.0)])
+def test_mean_descent_touches_down_as_the_vehicle_does(gains: Gains) -> None:
+    """The whole mean descent of `paper`: the vehicle's touchdown, early or not, mass change and all."""
     preset = PRESETS["paper"]
     position, velocity, time = mean_descent(preset)
     gravity = np.array(preset.gravity)
     for shift in (-0.2, 0.0, 0.15):
         clock = Clock.of(time + shift, PERIOD)
-        ours = fly_sampled(Gains(6.0, 2.0), clock, position, velocity, gravity)
-        command = ZemZevCommand(6.0, 2.0, time + shift)
+        ours = fly_sampled(gains, clock, position, velocity, gravity)
+        command = ZemZevCommand(gains.position, gains.velocity, time + shift)
         flown = fly_interval(
             State(position, velocity, 1200.0),
             Decision(np.zeros(3), command, DecisionStatus.NOMINAL),
@@ -229,8 +230,9 @@ def test_mean_descent_touches_down_as_the_vehicle_does() -> None:
             0.0,
         )
         assert flown.status == FlightStatus.TOUCHDOWN
-        speed = float(touchdown_speed(ours, PERIOD, gravity))
-        assert float(np.linalg.norm(flown.path[-1, 3:6])) == pytest.approx(speed, abs=0.05)
+        speed, moment = touch_down(ours, PERIOD, gravity)
+        assert float(np.linalg.norm(flown.path[-1, 3:6])) == pytest.approx(float(speed), abs=0.05)
+        assert flown.time[-1] == pytest.approx(float(moment), abs=0.1)
 
 
 def test_flights_of_many_phases_are_flights_of_one() -> None:
