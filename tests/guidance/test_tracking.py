@@ -66,7 +66,7 @@ def test_gains_solve_the_riccati_equation_and_are_stable(
     gains = np.array([tracking_gains(h, TrackingWeights(position, velocity, acceleration))])
     motion, push = np.array([[1.0, h], [0.0, 1.0]]), np.array([[0.5 * h * h], [h]])
     cost, effort = np.diag([position**-2, velocity**-2]), acceleration**-2
-    value = cost.copy()  # value iteration: an oracle that shares nothing with a Riccati solver
+    value, gain = cost.copy(), np.zeros((1, 2))  # value iteration: shares nothing with a Riccati solver
     for _ in range(4000):
         gain = (push.T @ value @ motion) / (effort + push.T @ value @ push)
         value = cost + motion.T @ value @ (motion - push @ gain)

@@ -77,6 +77,7 @@ def test_without_an_answer_the_last_plan_flies_on_then_zem_zev() -> None:
     command, status, _ = law.command(below_gate, moved, memory)
     assert status is DecisionStatus.FALLBACK_LAST_PLAN
     assert isinstance(command, PlanCommand)
+    assert memory.reference is not None
     np.testing.assert_array_equal(command.reference.position[-1], memory.reference.position[-1])
     command, status, _ = law.command(below_gate, moved, law.begin(scenario.view))
     assert status is DecisionStatus.FALLBACK_ZEM_ZEV
