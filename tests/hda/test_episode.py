@@ -11,6 +11,7 @@ import pytest
 import hda
 from guidance import State
 from hda.episode import EpisodeRecord, advance, begin_flight, elevation_angle, fly, observe
+from hda.lidar import look
 from hda.outcome import Ending
 from hda.policy import Decision, Policy, ZemZevCommand
 from hda.scenario import Range, Rules, Scenario, StartConditions
@@ -167,6 +168,17 @@ def test_each_look_stands_where_and_when_the_flight_stands(records):
                 assert observation.time_to_go == ended.time_to_go
 
 
+def test_look_k_meets_the_noise_of_look_k(records):
+    for (_, episode), record in records.items():
+        sensor = np.random.SeedSequence([3, int(episode)]).spawn(4)[1]
+        for k, child in enumerate(sensor.spawn(len(record.observations))):
+            observation = record.observations[k]
+            noise = np.random.default_rng(child).standard_normal((64, 64), dtype=np.float32)
+            truth = record.scenario.tile.probability
+            seen = look(hda.Lidar(), observation.state.position, observation.target, truth, noise)
+            np.testing.assert_array_equal(observation.safety_map, seen)
+
+
 def test_observations_share_no_memory_with_each_other_or_with_the_tile(records):
     for record in records.values():
         tile = record.scenario.tile
@@ -262,6 +274,19 @@ def test_the_outcome_is_judged_on_the_true_map_at_the_touchdown_cell(records):
         assert record.outcome.touchdown_speed == pytest.approx(float(np.linalg.norm(record.velocity[-1])))
         endings.add(record.outcome.ending)
     assert {Ending.SUCCESS, Ending.UNSAFE_SITE} <= endings
+
+
+@pytest.mark.parametrize("safe_where_it_lands", [True, False])
+def test_the_ground_under_the_touchdown_counts_and_not_the_site(scenarios, safe_where_it_lands):
+    landed = fly(steady(0.01), scenarios[0]).outcome
+    x, y, _ = landed.touchdown
+    assert landed.miss_distance > 50.0
+    verdict = np.full((1000, 1000), not safe_where_it_lands)
+    verdict[math.floor(y), math.floor(x)] = safe_where_it_lands
+    scenario = replace(scenarios[0], tile=replace(scenarios[0].tile, deterministic=verdict))
+    record = fly(steady(0.01), scenario)
+    assert record.outcome.safe_site == safe_where_it_lands
+    assert record.rewards[-1].safety == (1.0 if safe_where_it_lands else -1.0)
 
 
 # The end
