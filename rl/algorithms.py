@@ -22,11 +22,16 @@ class AgentSettings:
         algorithm: which one.
         layout: observation vector ("relative" or "printed").
         hidden: sizes of the hidden layers of every network.
-        learning_rate: of Adam.
+        learning_rate: of Adam, until the decay begins.
+        final_learning_rate: where the decay ends.
+        learning_rate_decay: steps at which its linear decay begins and ends.
         batch_size: transitions per update.
         discount: gamma.
         target_rate: tau, of the target networks.
-        exploration_noise: standard deviation of the noise on actions (deterministic actors only).
+        exploration_noise: standard deviation of the noise on actions (deterministic actors only), until the
+            decay begins.
+        final_noise: where the decay ends.
+        noise_decay: steps at which its linear decay begins and ends.
         random_steps: steps with uniform actions before the first update.
         replay_size: transitions kept.
         matmul_precision: "highest" is float32; "medium" lets the processor multiply in bfloat16 where it can.
@@ -37,10 +42,14 @@ class AgentSettings:
     layout: str = RELATIVE.name
     hidden: tuple[int, ...] = (256, 256)
     learning_rate: float = 1e-3
+    final_learning_rate: float = 1e-4
+    learning_rate_decay: tuple[int, int] = (80_000, 250_000)
     batch_size: int = 256
     discount: float = 0.98
     target_rate: float = 0.005
     exploration_noise: float = 0.5
+    final_noise: float = 0.1
+    noise_decay: tuple[int, int] = (40_000, 120_000)
     random_steps: int = 20_000
     replay_size: int = 400_000
     matmul_precision: Literal["highest", "high", "medium"] = "medium"
@@ -50,6 +59,21 @@ class AgentSettings:
     def action_ranges(self) -> ActionRanges:
         """What actions mean."""
         return ActionRanges(shift=self.shift)
+
+    def learning_rate_at(self, step: int) -> float:
+        """Learning rate at an environment step."""
+        return _decayed(step, self.learning_rate, self.final_learning_rate, self.learning_rate_decay)
+
+    def noise_at(self, step: int) -> float:
+        """Standard deviation of the exploration noise at an environment step."""
+        return _decayed(step, self.exploration_noise, self.final_noise, self.noise_decay)
+
+
+def _decayed(step: int, first: float, last: float, span: tuple[int, int]) -> float:
+    """Linear from `first` to `last` over the span of steps, constant before and after."""
+    begin, end = span
+    passed = min(1.0, max(0.0, (step - begin) / max(end - begin, 1)))
+    return first + passed * (last - first)
 
 
 TD3 = AgentSettings()
@@ -61,8 +85,10 @@ RECIPES: dict[str, AgentSettings] = {
     "td3-paper": AgentSettings(
         layout=PRINTED.name,
         learning_rate=3e-4,
+        final_learning_rate=3e-4,
         discount=0.99,
         exploration_noise=0.1,
+        final_noise=0.1,
         random_steps=25_000,
     ),
 }
@@ -82,11 +108,9 @@ def make_algorithm(settings: AgentSettings, env: Any, seed: int) -> OffPolicyAlg
         ValueError: unknown algorithm.
         ImportError: `tqc` without sb3-contrib.
     """
-    import numpy as np
     from stable_baselines3 import DDPG, SAC
-    from stable_baselines3.common.noise import NormalActionNoise
 
-    from rl.td3 import FastTD3
+    from rl.td3 import FastTD3, ScheduledNoise
 
     classes: dict[str, Any] = {"td3": FastTD3, "ddpg": DDPG, "sac": SAC}
     if settings.algorithm == "tqc":
@@ -95,10 +119,7 @@ def make_algorithm(settings: AgentSettings, env: Any, seed: int) -> OffPolicyAlg
         classes["tqc"] = TQC
     if settings.algorithm not in classes:
         raise ValueError(f"algorithm must be td3, sac, ddpg or tqc, got {settings.algorithm!r}")
-    options: dict[str, Any] = {}
-    if settings.algorithm in ("td3", "ddpg"):
-        options["action_noise"] = NormalActionNoise(np.zeros(5), np.full(5, settings.exploration_noise))
-    return classes[settings.algorithm](
+    algorithm: OffPolicyAlgorithm = classes[settings.algorithm](
         "MlpPolicy",
         env,
         learning_rate=settings.learning_rate,
@@ -112,5 +133,9 @@ def make_algorithm(settings: AgentSettings, env: Any, seed: int) -> OffPolicyAlg
         policy_kwargs={"net_arch": list(settings.hidden), "optimizer_kwargs": {"fused": True}},
         seed=seed,
         device="cpu",
-        **options,
     )
+    # decays follow the step and not SB3's share of the total, so that a longer run begins as a shorter one
+    algorithm.lr_schedule = lambda _: settings.learning_rate_at(algorithm.num_timesteps)
+    if settings.algorithm in ("td3", "ddpg"):
+        algorithm.action_noise = ScheduledNoise(lambda: settings.noise_at(algorithm.num_timesteps))
+    return algorithm

@@ -56,7 +56,7 @@ def settings_from_json(values: dict[str, Any]) -> AgentSettings:
     """Undo `dataclasses.asdict` and JSON on AgentSettings."""
     from rl.algorithms import AgentSettings
 
-    return AgentSettings(**{**values, "hidden": tuple(values["hidden"])})
+    return AgentSettings(**{**values, **{k: tuple(v) for k, v in values.items() if isinstance(v, list)}})
 
 
 def best_of_run(

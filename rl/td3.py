@@ -7,9 +7,27 @@ of the targets.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
+import numpy as np
 import torch
+from numpy.typing import NDArray
 from stable_baselines3 import TD3
+from stable_baselines3.common.noise import ActionNoise
 from torch.nn.functional import mse_loss
+
+
+class ScheduledNoise(ActionNoise):
+    """Gaussian noise on the five elements of an action, from NumPy's global generator as all of SB3."""
+
+    def __init__(self, deviation: Callable[[], float]) -> None:
+        """Ask `deviation` for the standard deviation at each draw."""
+        super().__init__()
+        self._deviation = deviation
+
+    def __call__(self) -> NDArray[np.float32]:
+        """One draw, shape (5,)."""
+        return np.random.normal(0.0, self._deviation(), 5).astype(np.float32)  # noqa: NPY002 - as SB3
 
 
 class FastTD3(TD3):
@@ -18,6 +36,7 @@ class FastTD3(TD3):
     def train(self, gradient_steps: int, batch_size: int = 100) -> None:
         """Update critics, and every `policy_delay` updates the actor and the targets."""
         self.policy.set_training_mode(True)
+        self._update_learning_rate([self.actor.optimizer, self.critic.optimizer])
         critic_losses, actor_losses = [], []
         for _ in range(gradient_steps):
             self._n_updates += 1
