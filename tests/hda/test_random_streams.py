@@ -13,7 +13,7 @@ SCENARIO, SENSOR, ACTUATOR, POLICY = range(4)
 
 
 def spawned(study_seed: int, episode: int, stream: int, *child: int) -> np.random.Generator:
-    """The generator that DESIGN names, made by spawning alone."""
+    """The generator of a stream, made by spawning alone."""
     sequence = np.random.SeedSequence([study_seed, episode]).spawn(4)[stream]
     for k in child:
         sequence = sequence.spawn(k + 1)[k]

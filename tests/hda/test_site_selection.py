@@ -41,7 +41,7 @@ def coarse_map(seed: int, pixels: int) -> np.ndarray:
 
 
 def pixel_centre(row: int, column: int, pixels: int, width: float) -> tuple[float, float]:
-    """DESIGN 2: pixel (i, j) lies at r_f + ((j + 0.5)/n - 0.5, (i + 0.5)/n - 0.5) w."""
+    """Pixel (i, j) lies at r_f + ((j + 0.5)/n - 0.5, (i + 0.5)/n - 0.5) w."""
     x = TARGET[0] + ((column + 0.5) / pixels - 0.5) * width
     y = TARGET[1] + ((row + 0.5) / pixels - 0.5) * width
     return x, y
