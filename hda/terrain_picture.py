@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from rich.console import Console
 
 from hda.base_surface import rms_slope
+from hda.presets import PRESETS
 from hda.safety_map import DEFAULT_CRITERIA, SafetyCriteria, SafetyMap, assess_safety
 from hda.terrain import TerrainParameters, generate_terrain, terrain_rng
 
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 
 SUN_AZIMUTH = 315.0  # [deg] clockwise from north
 SUN_ELEVATION = 30.0  # [deg]
-DEFAULT_TERRAIN = TerrainParameters()
+DEFAULT_TERRAIN = PRESETS["paper"].terrain
 STEEPEST_SHOWN = 30.0  # [deg] upper end of the slope's colours
 
 
@@ -37,7 +38,7 @@ def show_terrain(
     Args:
         seed: number of the tile; the same number gives the same tile.
         show: picture to write (PNG, PDF or SVG by its suffix); none is written by default.
-        parameters: what the ground is like.
+        parameters: what the ground is like; by default that of the preset `paper`.
         criteria: what counts as safe.
     """
     if seed < 0:

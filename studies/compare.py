@@ -29,6 +29,7 @@ from studies.table import (
     print_table,
     summarize_policy,
     write_episodes,
+    write_markdown,
     write_table,
     write_timings,
 )
@@ -154,6 +155,7 @@ def compare(options: Comparison) -> list[PolicySummary]:
     summaries = summarize_study(study, flown.rows)
     write_episodes(out, rows)
     write_table(out / "table.csv", summaries)
+    write_markdown(out / "table.md", summaries)
     write_timings(out / "timings.csv", {name: flown.decision_time[name] for name in study.policies})
     write_provenance(out / "provenance.json", study)
     if options.figures:

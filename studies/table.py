@@ -150,6 +150,27 @@ def write_timings(path: Path, decision_time: dict[str, np.ndarray]) -> None:
             writer.writerow([policy, *(f"{value:.4g}" for value in quantiles)])
 
 
+def write_markdown(path: Path, summaries: Sequence[PolicySummary]) -> None:
+    """Write the table for a document: ratios with their intervals, means without."""
+    headings = ("policy", "safe site %", "success %", "miss m", "speed m/s", "propellant %", "slant deg")
+    lines = ["| " + " | ".join((*headings, "thrust N", "fallbacks")) + " |"]
+    lines.append("|---|" + "---:|" * (len(headings) + 1))
+    shown = [name for name in MEASURES if name != "reward"]
+    for s in summaries:
+        cells = [cell.replace("\n", " ").replace("\\", "") for cell in _printed_cells(s)[:3]]
+        cells += [f"{s.means[name].estimate:.{_digits(name)}f}" for name in shown]
+        lines.append("| " + " | ".join([*cells, str(s.fallbacks)]) + " |")
+    for name, row in PAPER_ROWS.items():
+        cells = [f"*the paper: {name}*", f"{row['safe_site_percent']:.1f}", ""]
+        cells += [f"{row[measure]:.{_digits(measure)}f}" for measure in shown]
+        lines.append("| " + " | ".join([*cells, ""]) + " |")
+    path.write_text("\n".join(lines) + "\n")
+
+
+def _digits(measure: str) -> int:
+    return {"maximum_thrust_n": 0, "miss_distance_m": 3}.get(measure, 2)
+
+
 def print_table(summaries: Sequence[PolicySummary]) -> None:
     """Print the table, with the paper's rows below ours."""
     from rich.console import Console
@@ -185,6 +206,6 @@ def _printed_cells(summary: PolicySummary) -> list[str]:
     ]
     for name in MEASURES:
         mean = summary.means[name]
-        digits = 0 if name == "maximum_thrust_n" else 2 if name != "miss_distance_m" else 3
+        digits = _digits(name)
         cells.append(f"{mean.estimate:.{digits}f}\n{mean.low:.{digits}f}-{mean.high:.{digits}f}")
     return [*cells, str(summary.fallbacks)]
