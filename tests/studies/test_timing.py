@@ -1,0 +1,200 @@
+"""The timing study: quantiles, regret and comparisons on made-up calls; the peer; a small real run."""
+
+import csv
+import importlib.util
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from guidance import PAPER_LANDER, Lander, Plan, PlanStatus, State, solve_pdg
+from guidance.problem import LandingProblem
+from studies import timing, timing_methods
+from studies.timing import Timing, study_timing
+from studies.timing_measures import (
+    Call,
+    compare_methods,
+    conclude,
+    keeps_limits,
+    measure_call,
+    summarize_calls,
+    wall_quantiles,
+)
+from studies.timing_methods import Method, make_case, reference_cases, timed_methods
+from studies.timing_peer import FREE_TIME_SOLVES, gfold_present, plan_gfold
+
+START = [180.0, 120.0, 940.0, -7.0, -4.0, -28.0, 1200.0]
+TARGET = [0.0, 0.0, 50.0]
+needs_gfold = pytest.mark.skipif(not gfold_present(), reason="the optional extra `peers` is not installed")
+
+
+def problem(lander: Lander = PAPER_LANDER) -> LandingProblem:
+    return LandingProblem(State.parse(START), np.array(TARGET), lander, np.array([0.0, 0.0, -1.62]))
+
+
+def call(method: str, case: str, seconds: float, regret: float, **changes) -> Call:
+    made = Call(method, case, True, True, PlanStatus.OPTIMAL, seconds, regret, 2, True)
+    return replace(made, **changes)
+
+
+CALLS = [
+    call("a", "one", 4.0, 0.1),
+    call("a", "two", 6.0, 0.3),
+    call("a", "three", 20.0, -9.0, keeps_limits=False),
+    call("a", "four", 99.0, math.nan, feasible=False, status=PlanStatus.INFEASIBLE, keeps_limits=False),
+    call("b", "one", 1.0, 0.2),
+    call("b", "two", 3.0, 0.4),
+    call("b", "three", 2.0, 0.9),
+    call("b", "four", 9.0, math.nan, feasible=False, status=PlanStatus.SOLVER_FAILED, keeps_limits=False),
+]
+
+
+def test_wall_quantiles_are_measured_values() -> None:
+    assert wall_quantiles([float(k) for k in range(1, 1001)]) == (500.5, 991.0, 1000.0)
+    assert wall_quantiles([3.0, 1.0, 2.0]) == (2.0, 3.0, 3.0)
+    assert np.isnan(wall_quantiles([])).all()
+
+
+def test_summary_counts_only_plans_that_keep_every_limit() -> None:
+    first, second = summarize_calls("a", CALLS), summarize_calls("b", CALLS)
+    assert (first.feasible, first.solved, first.broken) == (3, 2, 1)
+    assert (first.infeasible, first.refused) == (1, 1)
+    assert (second.infeasible, second.refused) == (1, 0)
+    assert first.wall == (6.0, 20.0, 20.0)
+    assert first.regret == pytest.approx((0.2, 0.3))
+    assert first.solves == 2.0
+    uncounted = [replace(one, solves=0) for one in CALLS]
+    assert math.isnan(summarize_calls("a", uncounted).solves)
+
+
+def test_comparison_pairs_cases() -> None:
+    found = compare_methods(CALLS, "a", "b")
+    assert found.ratio == 3.0
+    assert found.paired == 4.0
+    assert (found.first_regret, found.second_regret) == pytest.approx((0.2, 0.3))
+
+
+def test_bars_are_met_or_not_as_measured() -> None:
+    def plan(_problem: LandingProblem, _nodes: int, _time: float | None) -> Plan:
+        raise AssertionError
+
+    methods = [Method("solve_pdg", 61, free, plan) for free in (True, False)]
+    methods.append(Method("gfold", 30, True, plan))
+    free, fixed, peer = (method.label for method in methods)
+
+    def words(seconds: float, regret: float) -> list[str]:
+        calls = [call(free, "x", 3.0, 0.1), call(fixed, "x", 1.0, 0.1), call(peer, "x", seconds, regret)]
+        return conclude(methods, calls, [summarize_calls(method.label, calls) for method in methods])
+
+    assert "3.00 fixed-time solves" in words(300.0, 0.2)[0]
+    assert words(300.0, 0.2)[0].endswith("bar 4: met.")
+    assert words(301.0, 0.2)[1].endswith("less regret: met.")
+    assert words(299.0, 0.2)[1].endswith("less regret: NOT met.")
+    assert words(301.0, 0.05)[1].endswith("less regret: NOT met.")
+    calls = [call(free, "x", 5.0, 0.1), call(fixed, "x", 1.0, 0.1)]
+    alone = conclude(methods[:2], calls, [])
+    assert alone[0].endswith("bar 4: NOT met.")
+    assert "not installed" in alone[1]
+
+
+def test_regret_is_against_the_tight_optimum() -> None:
+    case = make_case("start", problem())
+    assert case.feasible
+    tight = solve_pdg(START, TARGET, nodes=301)
+    assert case.propellant == pytest.approx(tight.propellant, abs=1e-3)
+    found = {
+        method.label: measure_call(method, case) for method in timed_methods() if method.name == "solve_pdg"
+    }
+    for one in found.values():
+        assert one.keeps_limits
+        assert -1e-3 < one.regret < 0.05
+        assert one.seconds > 0.0
+    assert found["solve_pdg, free, 61"].regret < found["solve_pdg, free, 31"].regret
+
+
+def test_a_plan_that_breaks_a_limit_is_seen() -> None:
+    plan = solve_pdg(START, TARGET)
+    assert keeps_limits(plan)
+    weak = Lander(dry_mass=1150.0, max_thrust=0.9 * 12000.0, specific_impulse=325.0)
+    assert not keeps_limits(replace(plan, problem=problem(weak)))
+    upright = Lander(
+        dry_mass=1150.0, max_thrust=12000.0, specific_impulse=325.0, pointing_limit=math.radians(5.0)
+    )
+    assert not keeps_limits(replace(plan, problem=problem(upright)))
+    assert not keeps_limits(Plan(PlanStatus.INFEASIBLE, problem(), "convex"))
+
+
+def test_rebuilt_cvxpy_compiles_every_time() -> None:
+    from guidance import reference_cvxpy
+
+    rebuilt = next(method for method in timed_methods() if method.name == "cvxpy, rebuilt")
+    assert rebuilt.prepare is not None
+    small, case = replace(rebuilt, nodes=9), make_case("start", problem())
+    for _ in range(2):
+        measure_call(small, case)
+        assert reference_cvxpy._model.cache_info().misses >= 1
+        assert reference_cvxpy._model.cache_info().currsize == 1
+
+
+@needs_gfold
+def test_gfold_flies_the_time_it_is_asked_for() -> None:
+    exact = solve_pdg(START, TARGET, nodes=61)
+    plan = plan_gfold(problem(), 30, exact.time_of_flight)
+    assert plan.time_of_flight == pytest.approx(exact.time_of_flight, rel=1e-12)
+    assert plan.nodes == 30
+    assert keeps_limits(plan)
+    assert plan.landing_error < 1e-3
+    assert 0.0 < plan.propellant - exact.propellant < 0.1
+    free = plan_gfold(problem(), 30)
+    assert free.solves == FREE_TIME_SOLVES
+    assert free.time_of_flight == pytest.approx(exact.time_of_flight, abs=0.3)
+
+
+@needs_gfold
+def test_gfold_says_infeasible_without_a_flight() -> None:
+    plan = plan_gfold(problem(), 30, 5.0)
+    assert not plan.status.has_flight
+    assert plan.message
+
+
+def test_cases_of_a_file(tmp_path) -> None:
+    path = tmp_path / "cases.json"
+    path.write_text(json.dumps({"cases": [{"name": "bare"}]}))
+    with pytest.raises(ValueError, match="lacks the field 'position'"):
+        reference_cases(path)
+    with pytest.raises(OSError, match="absent"):
+        reference_cases(tmp_path / "absent.json")
+
+
+@pytest.mark.parametrize("present", [True, False])
+def test_study_writes_its_folder(tmp_path, monkeypatch, capsys, present: bool) -> None:
+    """Two starts by the quick methods; and the same where the peer is absent."""
+    if not present:
+        monkeypatch.setattr(importlib.util, "find_spec", lambda _name: None)
+    chosen = [m for m in timed_methods() if m.name in ("solve_pdg", "gfold") and m.nodes <= 31]
+    assert any(m.name == "gfold" for m in chosen) == (present and gfold_present())
+    monkeypatch.setattr(timing, "timed_methods", lambda: chosen)
+    cases = tmp_path / "cases.json"
+    listed = json.loads(timing._CASES.read_text())["cases"]
+    cases.write_text(json.dumps({"cases": [listed[0], listed[-1]]}))
+    summaries = study_timing(Timing(starts=1, cases=cases, out=tmp_path / "out"))
+    assert [s.method for s in summaries] == [m.label for m in chosen]
+    ours = summaries[0]
+    assert (ours.feasible, ours.solved, ours.infeasible, ours.refused) == (2, 2, 1, 1)
+    with (tmp_path / "out" / "timing.csv").open() as stream:
+        rows = list(csv.DictReader(stream))
+    assert [(r["method"], r["time"], r["nodes"]) for r in rows] == [
+        (m.name, "free" if m.free else "fixed", str(m.nodes)) for m in chosen
+    ]
+    assert (tmp_path / "out" / "timing.png").read_bytes().startswith(b"\x89PNG")
+    text = (tmp_path / "out" / "conclusions.txt").read_text()
+    assert ("not installed" in text) == (not any(m.name == "gfold" for m in chosen))
+    assert ("without it" in capsys.readouterr().out) == (not gfold_present())
+
+
+def test_options_are_checked() -> None:
+    with pytest.raises(ValueError, match="starts"):
+        Timing(starts=0)
+    assert timing_methods.PEER_NODES == 30
