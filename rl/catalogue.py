@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from hda.policies.composition import ComposedPolicy
+from hda.policies.planned_descent import PlannedDescent
 from hda.policies.zem_zev import FixedGainZemZev
 from hda.registry import PolicyEntry
 from rl.policy import AgentPolicy, AgentSite, shipped
@@ -26,6 +27,14 @@ _ENTRIES = (
             "td3-fixed-gain",
             lambda: ComposedPolicy("td3-fixed-gain", AgentSite(shipped("td3")), FixedGainZemZev()),
             "the paper's Fixed Control: the sites of td3, gains 6/2, time to go of the quartic",
+        ),
+    ),
+    (
+        "td3",
+        PolicyEntry(
+            "td3+convex",
+            lambda: ComposedPolicy("td3+convex", AgentSite(shipped("td3")), PlannedDescent()),
+            "the sites of td3, flown by convex guidance",
         ),
     ),
     ("sac", _agent("sac")),

@@ -1,0 +1,84 @@
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hda.episode import fly
+from hda.presets import PRESETS, sample_scenario
+from rl.algorithms import RECIPES
+from rl.artefacts import load_artefact
+from rl.export import ExportWeights, run_export
+from rl.figures import GainsFigure, TrainingFigure, draw_gains, draw_training, moving_average
+from rl.policy import AgentPolicy
+from rl.training import TrainingPlan, run_training
+
+SMALL = replace(RECIPES["sac"], hidden=(8, 8), batch_size=8, random_steps=20, replay_size=100)
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("runs")
+    for seed in (0, 1):
+        plan = TrainingPlan(
+            60, seed, "sac", validate_every=30, validation_episodes=2, checkpoint_every=1000, log_every=10
+        )
+        run_training(folder / str(seed), PRESETS["paper"], SMALL, plan, resume=False)
+    return folder / "0", folder / "1"
+
+
+def test_exported_weights_fly_and_tell_where_they_came_from(runs, tmp_path):
+    run_export(
+        ExportWeights(runs, "sac", candidates=2, episodes=2, validation_episodes=2, out=tmp_path / "weights")
+    )
+    artefact = load_artefact(tmp_path / "weights" / "sac", "actor")
+    training = artefact.card["training"]
+    assert [seed["seed"] for seed in training["seeds"]] == [0, 1]
+    assert training["command"].startswith(f"python -m rl.train sac --seed {training['seed']}")
+    chosen = runs[training["seed"]] / "actors" / f"step-{training['step']:09d}"
+    for name, tensor in load_artefact(chosen, "actor").tensors.items():
+        np.testing.assert_array_equal(artefact.tensors[name], tensor)
+    best = max(training["seeds"], key=lambda s: (s["tuning"]["success_percent"], s["tuning"]["reward"]))
+    assert best["seed"] == training["seed"]
+    record = fly(AgentPolicy("sac", tmp_path / "weights" / "sac"), sample_scenario("paper", 8, 0, "train"))
+    assert len(record.decisions) >= 1
+
+
+def test_runs_that_do_not_belong_together_are_refused(runs, tmp_path):
+    other = tmp_path / "other"
+    other.mkdir()
+    card = json.loads((runs[0] / "run.json").read_text())
+    card["settings"]["discount"] = 0.5
+    (other / "run.json").write_text(json.dumps(card))
+    with pytest.raises(ValueError, match="same settings"):
+        run_export(ExportWeights((runs[0], other), "sac"))
+    with pytest.raises(ValueError, match="not a run"):
+        run_export(ExportWeights((tmp_path / "nowhere",), "sac"))
+
+
+def test_figures_of_a_run(runs, tmp_path):
+    figure = draw_training(TrainingFigure(runs[0], window=2))
+    assert [panel.get_title() for panel in figure.axes] == [
+        "critic loss",
+        "actor loss",
+        "reward",
+        "safe ratio",
+    ]
+    figure.savefig(tmp_path / "training.png")
+    with pytest.raises(ValueError, match=r"training\.csv"):
+        draw_training(TrainingFigure(tmp_path))
+
+
+def test_figure_of_gains_shows_each_decision(tmp_path):
+    figure = draw_gains(GainsFigure(policy="nearest-safe", episode=0))
+    line = figure.axes[0].get_lines()[0]
+    np.testing.assert_array_equal(np.asarray(line.get_ydata()), 6.0)
+    figure.savefig(tmp_path / "gains.png")
+
+
+def test_moving_average_equals_its_definition():
+    values = np.random.default_rng(0).normal(size=30)
+    expected = [values[max(0, k - 4) : k + 1].mean() for k in range(30)]
+    np.testing.assert_allclose(moving_average(values, 5), expected, atol=1e-12)
