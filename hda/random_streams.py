@@ -20,11 +20,11 @@ class EpisodeStreams:
     """The four random streams of one episode.
 
     Attributes:
-        study_seed: seed of the whole study, at least zero.
-        episode: number of the episode within the study, at least zero.
+        study_seed: seed of the whole study, at least zero and below 2^32.
+        episode: number of the episode within the study, at least zero and below 2^32.
 
     Raises:
-        ValueError: a field is not a whole number of at least zero.
+        ValueError: a field is not such a whole number (larger ones would share streams with smaller ones).
     """
 
     study_seed: int
@@ -36,6 +36,8 @@ class EpisodeStreams:
             value = getattr(self, name)
             if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 0:
                 raise ValueError(f"{name} must be a whole number of at least 0, got {value!r}")
+            if value >= 2**32:
+                raise ValueError(f"{name} must be below 2^32, got {value!r}")
 
     def _generator(self, *key: int) -> np.random.Generator:
         sequence = np.random.SeedSequence((int(self.study_seed), int(self.episode)), spawn_key=key)

@@ -157,7 +157,8 @@ def write_markdown(path: Path, summaries: Sequence[PolicySummary]) -> None:
     lines.append("|---|" + "---:|" * (len(headings) + 1))
     shown = [name for name in MEASURES if name != "reward"]
     for s in summaries:
-        cells = [cell.replace("\n", " ").replace("\\", "") for cell in _printed_cells(s)[:3]]
+        name = s.policy + (" *" if s.privileged else "")
+        cells = [name, _ratio(s.safe_site, s.safe_site_by_tile), _ratio(s.success, s.success_by_tile)]
         cells += [f"{s.means[name].estimate:.{_digits(name)}f}" for name in shown]
         lines.append("| " + " | ".join([*cells, str(s.fallbacks)]) + " |")
     for name, row in PAPER_ROWS.items():
@@ -165,6 +166,11 @@ def write_markdown(path: Path, summaries: Sequence[PolicySummary]) -> None:
         cells += [f"{row[measure]:.{_digits(measure)}f}" for measure in shown]
         lines.append("| " + " | ".join([*cells, ""]) + " |")
     path.write_text("\n".join(lines) + "\n")
+
+
+def _ratio(plain: Interval, tiled: Interval) -> str:
+    ends = [100.0 * value for value in (plain.estimate, plain.low, plain.high, tiled.low, tiled.high)]
+    return "{:.1f} ({:.1f}-{:.1f}) [{:.1f}-{:.1f}]".format(*ends)
 
 
 def _digits(measure: str) -> int:
@@ -178,7 +184,7 @@ def print_table(summaries: Sequence[PolicySummary]) -> None:
 
     first = summaries[0]
     title = f"preset {first.preset}, {first.episodes} episodes (mean, 95 % interval; [] clustered by tile)"
-    table = Table(title=title)
+    table = Table(title=title, caption="* sees the true map; p: exact McNemar against single-divert")
     table.add_column("policy", no_wrap=True)
     headings = ("safe site %", "success %", "p", "miss m", "speed m/s", "prop. %", "slant deg", "thrust N")
     for heading in (*headings, "reward", "fallb."):
@@ -194,12 +200,11 @@ def print_table(summaries: Sequence[PolicySummary]) -> None:
 
 def _printed_cells(summary: PolicySummary) -> list[str]:
     def ratio(plain: Interval, tiled: Interval) -> str:
-        ends = [100.0 * value for value in (plain.estimate, plain.low, plain.high, tiled.low, tiled.high)]
-        return "{:.1f} ({:.1f}-{:.1f})\n\\[{:.1f}-{:.1f}]".format(*ends)
+        return _ratio(plain, tiled).replace(" (", "\n").replace(") [", "\n\\[")
 
     p = summary.mcnemar_p
     cells = [
-        summary.policy + (" (privileged)" if summary.privileged else ""),
+        summary.policy + (" *" if summary.privileged else ""),
         ratio(summary.safe_site, summary.safe_site_by_tile),
         ratio(summary.success, summary.success_by_tile),
         "" if np.isnan(p) else ("<1e-4" if p < 1e-4 else f"{p:.2g}"),

@@ -75,3 +75,10 @@ def test_a_bad_seed_is_named(name, bad):
     arguments = {"study_seed": 0, "episode": 0, name: bad}
     with pytest.raises(ValueError, match=f"^{name} must be a whole number"):
         EpisodeStreams(**arguments)
+
+
+def test_seeds_that_would_share_streams_are_refused():
+    with pytest.raises(ValueError, match="study_seed must be below"):
+        EpisodeStreams(2**32, 0)
+    with pytest.raises(ValueError, match="episode must be below"):
+        EpisodeStreams(0, 2**32 + 1)

@@ -299,3 +299,17 @@ def test_the_plane_is_the_terrains_greatest_height():
     preset = Preset("high", terrain=TerrainParameters(maximum_elevation=80.0))
     scenario = draw_scenario(preset, EpisodeStreams(0, 0), "train", [0], lambda _: tile)
     assert scenario.nominal_target[2] == 80.0
+
+
+@pytest.mark.parametrize(
+    ("name", "start"),
+    [
+        ("hazard_share", lambda: StartConditions(hazard_share=1.1)),
+        ("hazard_radius", lambda: StartConditions(hazard_radius=0.0)),
+        ("approach_spread", lambda: StartConditions(approach_spread=-0.1)),
+        ("distance", lambda: StartConditions(distance=Range(-1.0, 10.0))),
+    ],
+)
+def test_a_start_that_means_nothing_is_named(name, start):
+    with pytest.raises(ValueError, match=name):
+        start()
