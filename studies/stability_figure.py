@@ -54,6 +54,7 @@ def draw_stability(path: Path, preset: Preset, required: Requirement) -> None:
     _draw_map(axes[1, 0], free, "worst speed left at cut-off, mean descent [m/s]", speeds)
     _draw_map(axes[1, 1], held, "the same, gains frozen where margins end [m/s]", speeds)
     strikes = np.array([[descend(g, preset, 0.0).time_left.max() for g in row] for row in box])
+    strikes = np.maximum(strikes, 0.1 * period)  # after cut-off it is negative; the scale is a logarithm
     _draw_map(axes[1, 2], strikes, "worst time to go at which the plane is met [s]", (0.25, 1.0, 5.0, 10.0))
     figure.suptitle(
         f"ZEM/ZEV, control period {period:g} s; margins: {math.degrees(required.phase_margin):g} deg and a "

@@ -21,7 +21,7 @@ def draw_timing(path: Path, methods: Sequence[Method], calls: Sequence[Call]) ->
     """Draw the share of calls done by a time, and median regret against median time."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(15, 6.5), layout="constrained")
+    figure = Figure(figsize=(15, 7.5), layout="constrained")
     share, cost = figure.subplots(1, 2)
     families = list(dict.fromkeys(method.name for method in methods))
     for method in methods:
@@ -45,7 +45,7 @@ def draw_timing(path: Path, methods: Sequence[Method], calls: Sequence[Call]) ->
             middle = max(float(np.median(regrets)), _LEAST_REGRET)
             cost.plot(np.median(walls), middle, marker, color=color, markersize=8)
             cost.annotate(
-                method.label,
+                str(method.nodes),
                 (float(np.median(walls)), middle),
                 xytext=(6, 6),
                 textcoords="offset points",
@@ -54,13 +54,13 @@ def draw_timing(path: Path, methods: Sequence[Method], calls: Sequence[Call]) ->
     share.set_xscale("log")
     share.set_xlabel("wall time of a call [ms]")
     share.set_ylabel("calls on feasible cases done [%]")
-    share.legend(fontsize="small", title="method, time of flight, nodes")
+    figure.legend(loc="outside lower center", ncols=5, fontsize="small", title="method, time, nodes")
     cost.set_xscale("log")
     cost.set_yscale("log")
     cost.margins(0.2)
     cost.set_xlabel("median wall time [ms]")
     cost.set_ylabel("median propellant beyond the tight optimum [g]")
-    cost.set_title("round: free time of flight; square: fixed", fontsize="medium")
+    cost.set_title("round: free time of flight; square: fixed; number: nodes", fontsize="medium")
     for axis in (share, cost):
         axis.grid(alpha=0.25, which="both")
     figure.savefig(path, dpi=110)
