@@ -70,7 +70,7 @@ def ask(problem: LandingProblem, nodes: int, time_of_flight: float | None, metho
 
 
 def make_case(name: str, problem: LandingProblem, drawn: bool = False) -> Case:
-    """Find the tight optimum by the convex solver on 201 nodes, whose mesh costs less than a gram."""
+    """Find the tight optimum by the convex solver on a fine mesh."""
     plan = ask(problem, _TIGHT_NODES, None)
     return Case(name, problem, plan.status.has_flight, plan.propellant, plan.time_of_flight, drawn)
 

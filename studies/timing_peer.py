@@ -2,7 +2,7 @@
 
 Its mesh has n nodes and steps of t/n, so that a flight asked to last t lasts t (n - 1)/n: asked for a fixed
 time, it is asked for t n/(n - 1) here, and its plans are laid on the steps it flew. With no least thrust it
-divides by it and fails; 0.1 % of the full thrust is asked instead, at a cost of about a gram. Its own bracket
+divides by it and fails; 0.1 % of the full thrust is asked instead. Its own bracket
 of the time of flight (up to all propellant burnt at the least thrust) holds no feasible sample then; it is
 given the closed-form window. Its log-mass bounds are linearised once, at full thrust from the start, hence a
 little too tight. It reads positions from the origin, so the target stands there. Version 0.3.2 takes a
