@@ -37,7 +37,8 @@ class SoftLandingOptions:
         thrust_margin: share of the greatest thrust that the plan leaves to the feedback.
         terminal_periods: control periods of the terminal phase.
         terminal_deceleration: [m/s^2] net deceleration in it.
-        speed_limit: [m/s] greatest speed; None for none. A slower descent sees more before it commits.
+        speed_limit: [m/s] greatest speed, or the present speed and a little where that is faster; None for
+            none. A slower descent sees more before it commits.
         nodes: nodes of the plan to the gate.
         method: planner, as in `solve_pdg`.
     """
@@ -58,6 +59,7 @@ class SoftLandingOptions:
 
 DEFAULT_OPTIONS = SoftLandingOptions()
 
+_SPEED_EASE = 1.02
 _LANDING_ERROR_SLACK = 0.5
 """[m] by which whole control periods may move the landing point."""
 
@@ -88,6 +90,14 @@ class _Approach:
     gravity: Array
     options: SoftLandingOptions
 
+    @property
+    def speed_limit(self) -> float | None:
+        """[m/s] the limit asked for, eased where the vehicle is faster already: it cannot brake at once."""
+        asked = self.options.speed_limit
+        if asked is None:
+            return None
+        return max(asked, _SPEED_EASE * float(np.linalg.norm(self.state.velocity)))
+
     def solve(self, time_of_flight: float | None, sinking: float = 0.0, nearest: bool = True) -> Plan | None:
         """Plan to pass the gate at `sinking` [m/s] downward; None where the frame starts below the gate."""
         drift = np.array([0.0, 0.0, -sinking])
@@ -99,7 +109,7 @@ class _Approach:
             self.gate,
             lander=self.engine,
             gravity=self.gravity,
-            speed_limit=self.options.speed_limit,
+            speed_limit=self.speed_limit,
             time_of_flight=time_of_flight,
             nodes=self.options.nodes,
             method=self.options.method,

@@ -128,3 +128,20 @@ def test_options_are_named() -> None:
         SoftLandingOptions(terminal_periods=0)
     with pytest.raises(ValueError, match="terminal_deceleration"):
         SoftLandingOptions(terminal_deceleration=0.0)
+
+
+@pytest.mark.parametrize("speed", [20.0, 30.0, 45.0])
+def test_a_speed_limit_is_kept_and_eased_where_the_vehicle_is_faster_already(speed: float) -> None:
+    state = State(SITE + np.array([150.0, 0.0, 900.0]), np.array([-8.0, 0.0, -30.0]), 1200.0)
+    reference = plan_soft_landing(
+        state, SITE, PAPER_LANDER, PERIOD, SoftLandingOptions(speed_limit=speed)
+    ).reference
+    assert reference is not None
+    fastest = np.linalg.norm(reference.velocity, axis=1).max()
+    start = float(np.linalg.norm(state.velocity))
+    assert (
+        fastest <= max(speed, 1.02 * start) + 3.0 + 1e-3
+    )  # held in the frame that sinks at the gate's 3 m/s
+    free = plan_soft_landing(state, SITE, PAPER_LANDER, PERIOD).reference
+    assert free is not None
+    assert np.linalg.norm(free.velocity, axis=1).max() > max(speed, 1.02 * start) + 5.0
