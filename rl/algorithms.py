@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 from rl.action import ActionRanges
-from rl.encoding import PRINTED, RELATIVE
+from rl.encoding import CURVED, PRINTED
 
 if TYPE_CHECKING:
     from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
@@ -20,7 +20,7 @@ class AgentSettings:
 
     Attributes:
         algorithm: which one.
-        layout: observation vector ("relative" or "printed").
+        layout: observation vector (a name in `rl.encoding.LAYOUTS`).
         hidden: sizes of the hidden layers of every network.
         learning_rate: of Adam, until the decay begins.
         final_learning_rate: where the decay ends.
@@ -32,6 +32,8 @@ class AgentSettings:
             decay begins.
         final_noise: where the decay ends.
         noise_decay: steps at which its linear decay begins and ends.
+        saturation_weight: of the penalty that keeps a deterministic actor off the ends of its range (td3
+            only; see `rl.td3.FastTD3`).
         random_steps: steps with uniform actions before the first update.
         replay_size: transitions kept.
         matmul_precision: "highest" is float32; "medium" lets the processor multiply in bfloat16 where it can.
@@ -39,7 +41,7 @@ class AgentSettings:
     """
 
     algorithm: AlgorithmName = "td3"
-    layout: str = RELATIVE.name
+    layout: str = CURVED.name
     hidden: tuple[int, ...] = (256, 256)
     learning_rate: float = 1e-3
     final_learning_rate: float = 1e-4
@@ -50,6 +52,7 @@ class AgentSettings:
     exploration_noise: float = 0.5
     final_noise: float = 0.1
     noise_decay: tuple[int, int] = (40_000, 120_000)
+    saturation_weight: float = 0.1
     random_steps: int = 20_000
     replay_size: int = 400_000
     matmul_precision: Literal["highest", "high", "medium"] = "medium"
@@ -79,9 +82,9 @@ def _decayed(step: int, first: float, last: float, span: tuple[int, int]) -> flo
 TD3 = AgentSettings()
 RECIPES: dict[str, AgentSettings] = {
     "td3": TD3,
-    "sac": replace(TD3, algorithm="sac", random_steps=5_000),
+    "sac": replace(TD3, algorithm="sac", random_steps=5_000, learning_rate_decay=(30_000, 150_000)),
     "ddpg": replace(TD3, algorithm="ddpg"),
-    "tqc": replace(TD3, algorithm="tqc", random_steps=5_000),
+    "tqc": replace(TD3, algorithm="tqc", random_steps=5_000, learning_rate_decay=(30_000, 150_000)),
     "td3-paper": AgentSettings(
         layout=PRINTED.name,
         learning_rate=3e-4,
@@ -89,6 +92,7 @@ RECIPES: dict[str, AgentSettings] = {
         discount=0.99,
         exploration_noise=0.1,
         final_noise=0.1,
+        saturation_weight=0.0,
         random_steps=25_000,
     ),
 }
@@ -136,6 +140,8 @@ def make_algorithm(settings: AgentSettings, env: Any, seed: int) -> OffPolicyAlg
     )
     # decays follow the step and not SB3's share of the total, so that a longer run begins as a shorter one
     algorithm.lr_schedule = lambda _: settings.learning_rate_at(algorithm.num_timesteps)
+    if isinstance(algorithm, FastTD3):
+        algorithm.saturation_weight = settings.saturation_weight
     if settings.algorithm in ("td3", "ddpg"):
         algorithm.action_noise = ScheduledNoise(lambda: settings.noise_at(algorithm.num_timesteps))
     return algorithm

@@ -30,6 +30,7 @@ class Element:
         scale: physical difference that is encoded as 1.
         low: least encoded value.
         high: greatest encoded value.
+        curved: the encoded value x becomes asinh(x) / 2: fine near the center, coarse far from it.
     """
 
     name: str
@@ -37,6 +38,7 @@ class Element:
     scale: float
     low: float
     high: float
+    curved: bool = False
 
 
 @dataclass(frozen=True)
@@ -64,6 +66,11 @@ class Layout:
         return np.array([element.scale for element in self.elements])
 
     @cached_property
+    def curved(self) -> NDArray[np.bool_]:
+        """Which elements are curved, shape (k,)."""
+        return np.array([element.curved for element in self.elements])
+
+    @cached_property
     def low(self) -> NDArray[np.float32]:
         """Least encoded values, shape (k,)."""
         return np.array([element.low for element in self.elements], dtype=np.float32)
@@ -75,7 +82,9 @@ class Layout:
 
     def scaled(self, values: NDArray[np.float64]) -> NDArray[np.float32]:
         """Encode the physical values of the elements, shape (k,)."""
-        return np.clip((values - self.center) / self.scale, self.low, self.high).astype(np.float32)
+        scaled = (values - self.center) / self.scale
+        scaled[self.curved] = 0.5 * np.arcsinh(scaled[self.curved])
+        return np.clip(scaled, self.low, self.high).astype(np.float32)
 
 
 _VELOCITY = (
@@ -104,6 +113,24 @@ RELATIVE = Layout(
 """Position relative to the current target, velocity, mass, width of the look, time to go, and how far the
 target has been moved from the first one."""
 
+CURVED = Layout(
+    "curved",
+    (
+        Element("offset_x", 0.0, 5.0, -8.0, 8.0, curved=True),
+        Element("offset_y", 0.0, 5.0, -8.0, 8.0, curved=True),
+        Element("height", 0.0, 5.0, -1.0, 8.0, curved=True),
+        Element("velocity_x", 0.0, 2.0, -8.0, 8.0, curved=True),
+        Element("velocity_y", 0.0, 2.0, -8.0, 8.0, curved=True),
+        Element("velocity_z", 0.0, 2.0, -8.0, 8.0, curved=True),
+        _MASS,
+        Element("width", 0.0, 2.0, -1.0, 8.0, curved=True),
+        Element("time_to_go", 0.0, 1.0, -8.0, 8.0, curved=True),
+        *RELATIVE.elements[9:],
+    ),
+    ("diversion_z",),
+)
+"""The elements of RELATIVE, fine near the ground, where metres and tenths of a second decide."""
+
 PRINTED = Layout(
     "printed",
     (
@@ -122,7 +149,7 @@ PRINTED = Layout(
 )
 """The vector that the paper prints: absolute position, two equal widths, absolute target, no time to go."""
 
-LAYOUTS = {layout.name: layout for layout in (RELATIVE, PRINTED)}
+LAYOUTS = {layout.name: layout for layout in (RELATIVE, CURVED, PRINTED)}
 
 
 def encode_flight(
@@ -139,7 +166,7 @@ def encode_flight(
         Shape (12,).
     """
     state = observation.state
-    if layout.name == RELATIVE.name:
+    if layout is not PRINTED:
         clock = (observation.width, observation.time_to_go)
         parts = (state.position - observation.target, state.velocity, (state.mass,), clock)
         values = np.concatenate([*parts, observation.target - nominal_target])

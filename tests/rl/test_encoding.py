@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from guidance.state import State
 from hda.observation import Observation
-from rl.encoding import LATENT_BOUND, LATENT_SIZE, LAYOUTS, PRINTED, RELATIVE, encode_observation
+from rl.encoding import CURVED, LATENT_BOUND, LATENT_SIZE, LAYOUTS, PRINTED, RELATIVE, encode_observation
 
 LATENT = np.linspace(-1.0, 1.0, LATENT_SIZE, dtype=np.float32)
 NOMINAL = np.array([400.0, 600.0, 50.0])
@@ -45,6 +45,13 @@ def test_relative_vector_element_by_element():
     assert vector.dtype == np.float32
     np.testing.assert_allclose(vector[:12], expected, rtol=1e-6)
     np.testing.assert_array_equal(vector[12:], LATENT)
+
+
+def test_curved_vector_element_by_element():
+    vector = encode_observation(CURVED, observation(), NOMINAL, LATENT)
+    curved = np.arcsinh([20 / 5, -60 / 5, 850 / 5, 2.5, -3.0, -15.0, 171 / 2, 33.0]) / 2
+    expected = [*curved[:6], 0.8, *curved[6:], 0.3, -0.4, 0.0]
+    np.testing.assert_allclose(vector[:12], expected, rtol=1e-6)
 
 
 def test_printed_vector_element_by_element():
