@@ -27,7 +27,6 @@ from studies.timing_peer import FREE_TIME_SOLVES, gfold_present, plan_gfold
 
 START = [180.0, 120.0, 940.0, -7.0, -4.0, -28.0, 1200.0]
 TARGET = [0.0, 0.0, 50.0]
-needs_gfold = pytest.mark.skipif(not gfold_present(), reason="the optional extra `peers` is not installed")
 
 
 def problem(lander: Lander = PAPER_LANDER) -> LandingProblem:
@@ -138,7 +137,6 @@ def test_rebuilt_cvxpy_compiles_every_time() -> None:
         assert reference_cvxpy._model.cache_info().currsize == 1
 
 
-@needs_gfold
 def test_gfold_flies_the_time_it_is_asked_for() -> None:
     exact = solve_pdg(START, TARGET, nodes=61)
     plan = plan_gfold(problem(), 30, exact.time_of_flight)
@@ -152,7 +150,6 @@ def test_gfold_flies_the_time_it_is_asked_for() -> None:
     assert free.time_of_flight == pytest.approx(exact.time_of_flight, abs=0.3)
 
 
-@needs_gfold
 def test_gfold_says_infeasible_without_a_flight() -> None:
     plan = plan_gfold(problem(), 30, 5.0)
     assert not plan.status.has_flight
