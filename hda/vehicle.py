@@ -9,34 +9,32 @@ does.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
 from numpy.typing import NDArray
 
-from guidance.dynamics import propagate_into
 from guidance.kernel import compile_kernel
 from guidance.lander import Lander
 from guidance.state import State
 from guidance.zem_zev import saturate_into, zem_zev_into
+from hda import held_thrust
+from hda.held_thrust import FLYING, TOUCHDOWN, VehicleNumbers, fall_to_plane, hold_period
 from hda.policy import Decision, ZemZevCommand
 
 
 class FlightStatus(IntEnum):
     """Where an interval left the vehicle."""
 
-    FLYING = 0
-    TOUCHDOWN = 1
+    FLYING = held_thrust.FLYING
+    TOUCHDOWN = held_thrust.TOUCHDOWN
     """The target plane was crossed."""
-    TANK_EMPTY = 2
+    TANK_EMPTY = held_thrust.TANK_EMPTY
     """The tank ran dry above the plane; the vehicle then fell to it."""
 
 
-_FLYING, _TOUCHDOWN, _TANK_EMPTY = 0, 1, 2
 _LEAST_TELLING = 0.05  # [m/s^2] commanded acceleration under which the engine's error is not estimated
-_Vehicle = tuple[float, float, float, float]  # min thrust, max thrust, exhaust velocity, dry mass
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,110 +64,6 @@ class Segment:
 
 
 @compile_kernel
-def _fall_time(height: float, climb: float, pull: float) -> float:
-    """Time for a free fall through `height` >= 0, starting at vertical speed `climb`; pull > 0."""
-    root = math.sqrt(climb * climb + 2.0 * pull * height)
-    # both forms are exact; each avoids cancellation on its side
-    return (climb + root) / pull if climb >= 0.0 else 2.0 * height / (root - climb)
-
-
-@compile_kernel
-def _lowest_instant(
-    start: NDArray[np.float64],
-    thrust: NDArray[np.float64],
-    duration: float,
-    gravity: NDArray[np.float64],
-    exhaust_velocity: float,
-    out: NDArray[np.float64],
-) -> float:
-    """When the vertical velocity, negative at the start and positive at the end, passes zero."""
-    low = 0.0
-    high = duration
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        propagate_into(start, thrust, middle, gravity, exhaust_velocity, out)
-        if out[5] < 0.0:
-            low = middle
-        else:
-            high = middle
-    return high
-
-
-@compile_kernel
-def _hold(
-    start: NDArray[np.float64],
-    thrust: NDArray[np.float64],
-    duration: float,
-    gravity: NDArray[np.float64],
-    exhaust_velocity: float,
-    plane: float,
-    out: NDArray[np.float64],
-) -> tuple[float, bool]:
-    """Hold a thrust for `duration`, or until the plane is crossed: (time flown, whether it was crossed)."""
-    propagate_into(start, thrust, duration, gravity, exhaust_velocity, out)
-    high = duration
-    below = out[2] <= plane
-    if not below and start[5] < 0.0 < out[5] and start[2] + start[5] * duration < plane:
-        high = _lowest_instant(start, thrust, duration, gravity, exhaust_velocity, out)
-        propagate_into(start, thrust, high, gravity, exhaust_velocity, out)
-        below = out[2] <= plane
-        if not below:
-            propagate_into(start, thrust, duration, gravity, exhaust_velocity, out)
-    if not below:
-        return duration, False
-    low = 0.0
-    for _ in range(80):
-        middle = 0.5 * (low + high)
-        propagate_into(start, thrust, middle, gravity, exhaust_velocity, out)
-        if out[2] > plane:
-            low = middle
-        else:
-            high = middle
-    propagate_into(start, thrust, high, gravity, exhaust_velocity, out)
-    return high, True
-
-
-@compile_kernel
-def _fall(
-    start: NDArray[np.float64],
-    gravity: NDArray[np.float64],
-    plane: float,
-    out: NDArray[np.float64],
-) -> float:
-    """Fall freely to the plane; return the time it took."""
-    time = _fall_time(max(0.0, start[2] - plane), start[5], -gravity[2])
-    propagate_into(start, np.zeros(3), time, gravity, 1.0, out)
-    return time
-
-
-@compile_kernel
-def hold_period(
-    start: NDArray[np.float64],
-    commanded: NDArray[np.float64],
-    thrust_error: float,
-    duration: float,
-    gravity: NDArray[np.float64],
-    vehicle: _Vehicle,
-    plane: float,
-    out: NDArray[np.float64],
-) -> tuple[float, int]:
-    """Apply a command for one period, ended early by the ground or the tank: (time flown, status)."""
-    applied = commanded * (1.0 + thrust_error)
-    flow = math.sqrt(applied[0] ** 2 + applied[1] ** 2 + applied[2] ** 2) / vehicle[2]
-    burn = duration
-    dry = flow * duration >= start[6] - vehicle[3] and flow > 0.0
-    if dry:
-        burn = (start[6] - vehicle[3]) / flow
-    flown, crossed = _hold(start, applied, burn, gravity, vehicle[2], plane, out)
-    if crossed:
-        return flown, _TOUCHDOWN
-    if dry:
-        flown += _fall(out.copy(), gravity, plane, out)
-        return flown, _TANK_EMPTY
-    return flown, _FLYING
-
-
-@compile_kernel
 def _fly_zem_zev(
     start: NDArray[np.float64],
     site: NDArray[np.float64],
@@ -177,7 +71,7 @@ def _fly_zem_zev(
     clock: tuple[float, float, float],
     thrust_error: float,
     gravity: NDArray[np.float64],
-    vehicle: _Vehicle,
+    vehicle: VehicleNumbers,
     time: NDArray[np.float64],
     path: NDArray[np.float64],
     commanded: NDArray[np.float64],
@@ -191,8 +85,8 @@ def _fly_zem_zev(
         remaining = time_to_go - rate * period * k
         if remaining <= 0.5 * period:
             commanded[k] = 0.0
-            time[k + 1] = time[k] + _fall(path[k], gravity, site[2], path[k + 1])
-            return k + 2, _TOUCHDOWN
+            time[k + 1] = time[k] + fall_to_plane(path[k], gravity, site[2], path[k + 1])
+            return k + 2, TOUCHDOWN
         if k == periods:
             break
         zem_zev_into(path[k], site, gains, remaining, gravity, commanded[k])
@@ -202,9 +96,9 @@ def _fly_zem_zev(
             path[k], commanded[k], thrust_error, period, gravity, vehicle, site[2], path[k + 1]
         )
         time[k + 1] = time[k] + flown
-        if status != _FLYING:
+        if status != FLYING:
             return k + 2, status
-    return periods + 1, _FLYING
+    return periods + 1, FLYING
 
 
 @compile_kernel
@@ -215,7 +109,7 @@ def _fly_plan(
     timing: tuple[float, float],
     thrust_error: float,
     gravity: NDArray[np.float64],
-    vehicle: _Vehicle,
+    vehicle: VehicleNumbers,
     time: NDArray[np.float64],
     path: NDArray[np.float64],
     commanded: NDArray[np.float64],
@@ -235,8 +129,8 @@ def _fly_plan(
     for k in range(periods + 1):
         if k >= left:
             commanded[k] = 0.0
-            time[k + 1] = time[k] + _fall(path[k], gravity, plane, path[k + 1])
-            return k + 2, _TOUCHDOWN
+            time[k + 1] = time[k] + fall_to_plane(path[k], gravity, plane, path[k + 1])
+            return k + 2, TOUCHDOWN
         if k == periods:
             break
         for axis in range(3):
@@ -249,10 +143,10 @@ def _fly_plan(
             path[k], commanded[k], thrust_error, period, gravity, vehicle, plane, path[k + 1]
         )
         time[k + 1] = time[k] + flown
-        if status != _FLYING:
+        if status != FLYING:
             return k + 2, status
         estimate = _estimate_error(path[k], path[k + 1], commanded[k], period, gravity, estimate)
-    return periods + 1, _FLYING
+    return periods + 1, FLYING
 
 
 @compile_kernel

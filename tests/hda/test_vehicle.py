@@ -16,8 +16,9 @@ from guidance import (
     time_to_go,
     zem_zev_acceleration,
 )
+from hda.held_thrust import hold_period
 from hda.policy import Decision, ZemZevCommand
-from hda.vehicle import FlightStatus, Segment, fly_interval, hold_period
+from hda.vehicle import FlightStatus, Segment, fly_interval
 from tests.oracles import flown_interval
 
 GRAVITY = np.array(MOON_GRAVITY)
