@@ -10,6 +10,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -20,9 +21,18 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from guidance.validation import finite_number
 from hda.presets import find_preset
 from hda.registry import policy_entry, policy_names
-from studies.monte_carlo import Study, StudyResult, local_processes, prepare_study, run_study
-from studies.provenance import write_provenance
+from studies.monte_carlo import (
+    Study,
+    StudyResult,
+    chunk_bounds,
+    fly_chunks,
+    join_chunks,
+    local_processes,
+    prepare_study,
+)
+from studies.provenance import describe_study, write_provenance
 from studies.rows import EpisodeRow
+from studies.study_folder import Existing, StudyFolder, open_study_folder
 from studies.table import (
     REFERENCE_POLICY,
     PolicySummary,
@@ -47,6 +57,8 @@ class Comparison:
         split: tile split: validation or fresh to evaluate, tuning for choices.
         workers: processes; changes nothing but the time.
         out: folder for results; results/PRESET by default.
+        resume: go on with the study in the folder, which must be the same; begins it where there is none.
+        overwrite: replace the study in the folder.
         figures: draw the histograms and trajectories.
     """
 
@@ -57,6 +69,8 @@ class Comparison:
     split: str = "validation"
     workers: int = 2
     out: Path | None = None
+    resume: bool = False
+    overwrite: bool = False
     figures: bool = True
 
 
@@ -96,6 +110,19 @@ def choose_policies(wanted: Sequence[str]) -> tuple[str, ...]:
     return tuple(name for name in policy_names() if name in chosen)
 
 
+def choose_existing(options: Comparison) -> Existing:
+    """What to do with a folder that holds a study.
+
+    Raises:
+        ValueError: two answers were given.
+    """
+    if options.resume and options.overwrite:
+        raise ValueError("resume and overwrite exclude each other")
+    if options.resume:
+        return Existing.RESUME
+    return Existing.OVERWRITE if options.overwrite else Existing.REFUSE
+
+
 def open_folder(out: Path) -> Path:
     """Make the results folder and write a file in it, before any episode is flown.
 
@@ -115,13 +142,30 @@ def with_reference(study: Study) -> Study:
     return replace(study, policies=(*study.policies, REFERENCE_POLICY)) if missing else study
 
 
-def fly_with_progress(study: Study, workers: int) -> StudyResult:
-    """Fly a study on local processes under a progress bar."""
-    prepare_study(study, workers)
+def fly_with_progress(folder: StudyFolder, workers: int) -> StudyResult:
+    """Fly what a folder's study still lacks, on local processes under a progress bar."""
+    study = folder.study
+    chunks, damages = folder.read_chunks()
+    for damage in damages:
+        Console(stderr=True).print(f"flown again: {damage}", style="yellow", markup=False, highlight=False)
+    finished = {(chunk.first, chunk.last) for chunk in chunks}
+    missing = [bounds for bounds in chunk_bounds(study) if bounds not in finished]
+    if missing:
+        prepare_study(study, workers)
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, transient=True) as progress, local_processes(workers) as executor:
-        task = progress.add_task("episodes", total=study.episodes * len(study.policies))
-        return run_study(study, executor, lambda count: progress.advance(task, count))
+    with Progress(*columns, transient=True) as progress:
+        each = len(study.policies)
+        done = sum(last - first for first, last in finished) * each
+        task = progress.add_task("episodes", total=study.episodes * each, completed=done)
+        for chunk in fly_chunks(study, missing, partial(local_processes, workers), workers=workers):
+            folder.store(chunk)
+            chunks.append(chunk)
+            progress.advance(task, (chunk.last - chunk.first) * each)
+            if chunk.attempts > 1:
+                progress.console.print(
+                    f"a worker died: episodes {chunk.first} to {chunk.last - 1} were flown again"
+                )
+    return join_chunks(study, chunks)
 
 
 def summarize_study(study: Study, rows: tuple[EpisodeRow, ...]) -> list[PolicySummary]:
@@ -145,25 +189,37 @@ def compare(options: Comparison) -> list[PolicySummary]:
     """Fly the comparison and write its folder: tables, provenance, figures, trajectories.
 
     Raises:
-        ValueError: an option is out of range or names something unknown.
+        ValueError: an option is out of range or names something unknown, the folder holds another study or is
+            being written, or a policy or a worker failed.
         OSError: the folder cannot be written.
     """
     study = plan_study(options)
+    existing = choose_existing(options)
     out = open_folder(options.out or Path("results") / study.preset.name)
-    flown = fly_with_progress(with_reference(study), options.workers)
+    with open_study_folder(out, with_reference(study), existing) as folder:
+        flown = fly_with_progress(folder, options.workers)
+        summaries = write_results(folder, study, flown, options.figures)
+    print_table(summaries)
+    Console().print(f"results in {out}")
+    return summaries
+
+
+def write_results(
+    folder: StudyFolder, study: Study, flown: StudyResult, figures: bool
+) -> list[PolicySummary]:
+    """Write every product of a flown study; the provenance comes last and says that it is complete."""
+    out = folder.path
     rows = tuple(row for row in flown.rows if row.policy in study.policies)
     summaries = summarize_study(study, flown.rows)
     write_episodes(out, rows)
     write_table(out / "table.csv", summaries)
     write_markdown(out / "table.md", summaries)
     write_timings(out / "timings.csv", {name: flown.decision_time[name] for name in study.policies})
-    write_provenance(out / "provenance.json", study)
-    if options.figures:
+    if figures:
         from studies.figures import draw_figures
 
         draw_figures(out, study, rows)
-    print_table(summaries)
-    Console().print(f"results in {out}")
+    write_provenance(out / "provenance.json", describe_study(folder.study, folder.describe_flight()))
     return summaries
 
 
@@ -172,6 +228,9 @@ def main() -> None:
     options = tyro.cli(Comparison, description=__doc__)
     try:
         compare(options)
+    except KeyboardInterrupt:
+        Console(stderr=True).print("stopped; finished episodes are kept, --resume goes on", style="yellow")
+        sys.exit(130)
     except (ValueError, OSError) as error:
         Console(stderr=True).print(f"error: {error}", style="red", markup=False, highlight=False)
         sys.exit(2)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import importlib.util
 import json
 import platform
 import subprocess
@@ -10,9 +12,10 @@ from dataclasses import asdict
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
+from typing import Any
 
 from hda.dtm_library import FORMAT_VERSION, Ground
-from studies.monte_carlo import Study
+from studies.monte_carlo import CHUNK_EPISODES, Study
 
 _PACKAGES = (
     "casadi",
@@ -44,29 +47,62 @@ def _git(root: Path, *arguments: str) -> str:
     return run.stdout.strip()
 
 
-def describe_study(study: Study) -> dict[str, object]:
-    """Versions, parameters, seeds, source commit and command of a study."""
+def identify_study(study: Study) -> dict[str, Any]:
+    """All that decides the bytes of a study's rows: parameters, versions, digests of the sources."""
     ground = Ground(study.preset.terrain, study.preset.criteria)
-    versions = {name: metadata.version(name) for name in ("lunar-hda", *_PACKAGES)}
     return {
-        "command": " ".join(sys.argv),
-        "finished": datetime.now(UTC).isoformat(timespec="seconds"),
-        "git_commit": git_commit(),
-        "python": platform.python_version(),
-        "machine": f"{platform.system()} {platform.machine()}",
-        "versions": versions,
         "study": {
             "episodes": study.episodes,
             "policies": list(study.policies),
             "study_seed": study.study_seed,
             "split": study.split,
+            "chunk_episodes": CHUNK_EPISODES,
         },
         "preset": asdict(study.preset),
         "terrain_key": ground.key,
         "terrain_format": FORMAT_VERSION,
+        "python": platform.python_version(),
+        "machine": f"{platform.system()} {platform.machine()}",
+        "versions": {name: metadata.version(name) for name in ("lunar-hda", *_PACKAGES)},
+        "sources": digest_sources(study),
     }
 
 
-def write_provenance(path: Path, study: Study) -> None:
-    """Write `describe_study` as JSON."""
-    path.write_text(json.dumps(describe_study(study), indent=1, sort_keys=True, default=str) + "\n")
+def digest_sources(study: Study) -> dict[str, str]:
+    """Package -> digest of every file in it, weights included; also the module of a policy given by path."""
+    root = Path(__file__).resolve().parent
+    digests = {name: _digest(root.parent / name) for name in ("guidance", "hda", "rl")}
+    digests["studies"] = _digest(root / "monte_carlo.py", root / "rows.py")
+    for policy in study.policies:
+        module, colon, _ = policy.partition(":")
+        found = importlib.util.find_spec(module) if colon else None
+        if found is not None and found.origin is not None:
+            digests[module] = _digest(Path(found.origin))
+    return digests
+
+
+def _digest(*places: Path) -> str:
+    total = hashlib.sha256()
+    for place in places:
+        files = [place] if place.is_file() else sorted(p for p in place.rglob("*") if p.is_file())
+        for file in files:
+            if "__pycache__" not in file.parts:
+                total.update(f"{file.relative_to(place.parent).as_posix()}\n".encode())
+                total.update(hashlib.sha256(file.read_bytes()).digest())
+    return total.hexdigest()[:16]
+
+
+def describe_study(study: Study, flight: dict[str, Any]) -> dict[str, Any]:
+    """What the study is, and how it was made: source commit, command, sessions and retries."""
+    return {
+        **identify_study(study),
+        "command": " ".join(sys.argv),
+        "finished": datetime.now(UTC).isoformat(timespec="seconds"),
+        "git_commit": git_commit(),
+        "flight": flight,
+    }
+
+
+def write_provenance(path: Path, provenance: dict[str, Any]) -> None:
+    """Write a provenance as JSON."""
+    path.write_text(json.dumps(provenance, indent=1, sort_keys=True, default=str) + "\n")
