@@ -23,6 +23,8 @@ from hda import held_thrust
 from hda.held_thrust import FLYING, TOUCHDOWN, VehicleNumbers, fall_to_plane, hold_period
 from hda.policy import Decision, ZemZevCommand
 
+_Log = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]  # time, path, commanded thrust
+
 
 class FlightStatus(IntEnum):
     """Where an interval left the vehicle."""
@@ -72,11 +74,10 @@ def _fly_zem_zev(
     thrust_error: float,
     gravity: NDArray[np.float64],
     vehicle: VehicleNumbers,
-    time: NDArray[np.float64],
-    path: NDArray[np.float64],
-    commanded: NDArray[np.float64],
+    log: _Log,
 ) -> tuple[int, int]:
     """Fly one interval; `clock` = (time to go, its rate, control period). Returns (nodes written, status)."""
+    time, path, commanded = log
     time_to_go, rate, period = clock
     periods = commanded.shape[0] - 1
     path[0] = start
@@ -110,15 +111,14 @@ def _fly_plan(
     thrust_error: float,
     gravity: NDArray[np.float64],
     vehicle: VehicleNumbers,
-    time: NDArray[np.float64],
-    path: NDArray[np.float64],
-    commanded: NDArray[np.float64],
+    log: _Log,
 ) -> tuple[int, int]:
     """Track a reference for one interval; `timing` = (control period, plane). Returns (nodes, status).
 
     The engine's error ratio is unknown at the start of the interval; once a period has been flown it is known
     from the change of velocity, which is compared with what the command should have given.
     """
+    time, path, commanded = log
     position, velocity, feedforward = reference
     period, plane = timing
     periods = commanded.shape[0] - 1
@@ -196,44 +196,20 @@ def fly_interval(
         ValueError: a plan was sampled at another control period than the vehicle's.
     """
     period, periods = interval
-    command = decision.command
-    time = np.empty(periods + 2)
-    path = np.empty((periods + 2, 7))
-    commanded = np.empty((periods + 1, 3))
+    time, path, commanded = np.empty(periods + 2), np.empty((periods + 2, 7)), np.empty((periods + 1, 3))
     vehicle = (lander.min_thrust, lander.max_thrust, lander.exhaust_velocity, lander.dry_mass)
+    start, log, command = state.as_array(), (time, path, commanded), decision.command
     if isinstance(command, ZemZevCommand):
-        nodes, status = _fly_zem_zev(
-            state.as_array(),
-            decision.site,
-            (command.position_gain, command.velocity_gain),
-            (command.time_to_go, command.time_to_go_rate, period),
-            thrust_error,
-            gravity,
-            vehicle,
-            time,
-            path,
-            commanded,
-        )
+        gains = (command.position_gain, command.velocity_gain)
+        clock = (command.time_to_go, command.time_to_go_rate, period)
+        nodes, status = _fly_zem_zev(start, decision.site, gains, clock, thrust_error, gravity, vehicle, log)
         left = command.time_to_go - command.time_to_go_rate * float(time[nodes - 1])
     else:
         reference = command.reference
-        if abs(reference.control_period - period) > 1e-9 * period:
-            raise ValueError(
-                f"command: its reference has a control period of {reference.control_period:g} s,"
-                f" the vehicle {period:g} s"
-            )
-        nodes, status = _fly_plan(
-            state.as_array(),
-            (reference.position, reference.velocity, reference.thrust_acceleration),
-            command.gains,
-            (period, float(decision.site[2])),
-            thrust_error,
-            gravity,
-            vehicle,
-            time,
-            path,
-            commanded,
-        )
+        _check_period(reference.control_period, period)
+        parts = (reference.position, reference.velocity, reference.thrust_acceleration)
+        timing = (period, float(decision.site[2]))
+        nodes, status = _fly_plan(start, parts, command.gains, timing, thrust_error, gravity, vehicle, log)
         left = reference.duration - float(time[nodes - 1])
     return Segment(
         time=time[:nodes],
@@ -243,3 +219,10 @@ def fly_interval(
         thrust_error=thrust_error,
         status=FlightStatus(status),
     )
+
+
+def _check_period(planned: float, flown: float) -> None:
+    if abs(planned - flown) > 1e-9 * flown:
+        raise ValueError(
+            f"command: its reference has a control period of {planned:g} s, the vehicle {flown:g} s"
+        )
