@@ -31,7 +31,8 @@ def plan_convex(
         problem: what to solve.
         nodes: N.
         time_of_flight: [s] or None to search for the best.
-        guess_time: [s] start of that search; None to find one on a coarse mesh.
+        guess_time: [s] start of that search where the indirect method has none; None to find one on a
+            coarse mesh.
 
     Returns:
         A plan that is OPTIMAL, or one without a flight: INFEASIBLE means "not found, proof still to come".
@@ -42,9 +43,9 @@ def plan_convex(
     else:
         tolerance = SHARE_TOLERANCE if guess_time is None else _REPLAN_TOLERANCE
         outcome = minimise_over_time(task, tolerance, guess_time, coarse_first=guess_time is None)
-        solution, solves = outcome.solution, len(outcome.tried)
-        if solution is None and outcome.window.empty:
-            return Plan(PlanStatus.INFEASIBLE, problem, METHOD, message=outcome.window.cause)
+        solution, solves = outcome.solution, outcome.solves
+        if solution is None and outcome.cause:
+            return Plan(PlanStatus.INFEASIBLE, problem, METHOD, message=outcome.cause)
     return _finish(task, solution, solves, PlanStatus.OPTIMAL)
 
 
@@ -59,7 +60,9 @@ def _finish(task: ConvexTask, found: ConvexSolution | None, solves: int, status:
         return replace(none, message=f"no flight of {found.time:g} s ({found.answer.words})")
     if found.propellant_share > problem.log_mass_ratio + _OVERDRAFT:
         return replace(none, message=_shortage(problem, found))
-    solution = task.refine(found)
+    solution, more = task.refine(found)
+    solves += more
+    none = replace(none, solves=solves)
     if not solution.solved or solution.propellant_share > problem.log_mass_ratio + _OVERDRAFT:
         words = "feasible only with thrust bounds relaxed outward: on the edge of what the lander can do"
         return replace(none, status=PlanStatus.LIMIT_REACHED, message=words)
@@ -104,7 +107,7 @@ def plan_nearest(problem: LandingProblem, nodes: int, time_of_flight: float | No
         solves = 1
     else:
         cheapest = minimise_over_time(anywhere)
-        solves = len(cheapest.tried)
+        solves = cheapest.solves
         found = cheapest.solution
         if found is None or found.propellant_share > problem.log_mass_ratio:
             message = "no soft landing anywhere in the target's plane was found"
@@ -112,19 +115,20 @@ def plan_nearest(problem: LandingProblem, nodes: int, time_of_flight: float | No
                 message += f"; {_shortage(problem, found)}"
             return Plan(PlanStatus.INFEASIBLE, problem, METHOD, message=message, solves=solves)
         outcome = minimise_over_time(nearest, _ERROR_TOLERANCE, found.time)
-        solves += len(outcome.tried)
+        solves += outcome.solves
         least = outcome.solution or nearest.solve(found.time)
     if not least.solved:
         message = f"no soft landing anywhere in the target's plane ({least.answer.words})"
         return Plan(PlanStatus.INFEASIBLE, problem, METHOD, message=message, solves=solves)
-    refined = nearest.refine(least)
+    refined, more = nearest.refine(least)
+    solves += more
     error = (refined if refined.solved else least).landing_error
     economical = replace(anywhere, error_limit=1.001 * error + _ERROR_SLACK)
     if time_of_flight is not None:
         last, more = economical.solve(time_of_flight), 1
     else:
         outcome = minimise_over_time(economical, SHARE_TOLERANCE, least.time, coarse_first=False)
-        last, more = outcome.solution, len(outcome.tried)
+        last, more = outcome.solution, outcome.solves
         if last is not None and last.propellant_share > problem.log_mass_ratio + _OVERDRAFT:
             last, more = economical.solve(least.time), more + 1
     return _finish(economical, last, solves + more, PlanStatus.NEAREST)

@@ -79,6 +79,10 @@ class TimeModel:
             return sample.time * (_BLIND_STEP if sample.slope < 0.0 else 1.0 / _BLIND_STEP)
         return sample.time * (1.0 + (1.0 - self.dead_time) * (goal / here - 1.0))
 
+    def gain(self, sample: TimedSolution) -> float:
+        """What the way to the stationary time promises, in units of the cost."""
+        return 0.5 * abs(sample.slope * (self.stationary_time(sample) - sample.time))
+
 
 class TimeSearch(Generic[Solution]):
     """Bracket, samples and steps of one search."""
@@ -102,9 +106,9 @@ class TimeSearch(Generic[Solution]):
         self.samples: list[Solution] = []
         self._edges: set[float] = set()  # ends of the bracket that have been evaluated
 
-    def sample(self, time: float) -> Solution:
-        """Evaluate one time and shrink the bracket by what it shows."""
-        solution = self._evaluate(time)
+    def sample(self, time: float, known: Solution | None = None) -> Solution:
+        """Evaluate one time, unless its solution is known, and shrink the bracket by what it shows."""
+        solution = self._evaluate(time) if known is None else known
         self.samples.append(solution)
         self._edges.add(time)
         if solution.solved:
@@ -121,9 +125,14 @@ class TimeSearch(Generic[Solution]):
             self.high = min(self.high, time)
         return solution
 
-    def run(self, guess: float) -> Solution | None:
-        """The cheapest solution found; None if every time tried, a grid over the window included, fails."""
-        latest = self.sample(guess)
+    def run(self, guess: float, known: Solution | None = None) -> Solution | None:
+        """The cheapest solution found; None if every time tried, a grid over the window included, fails.
+
+        Args:
+            guess: where to start.
+            known: the solution there, if the caller has it.
+        """
+        latest = self.sample(guess, known)
         if not latest.solved:
             found = self._probe(guess)
             if found is None:

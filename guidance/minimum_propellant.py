@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,9 +10,10 @@ from numpy.typing import NDArray
 
 from guidance.convex import ConstraintSet, ConvexSolution, convex_template
 from guidance.flight_time import TimeModel, TimeSearch
+from guidance.primer_vector import find_primer_flight
 from guidance.problem import LandingProblem
 from guidance.scaling import scale_problem
-from guidance.time_window import TimeWindow, guess_time, time_window
+from guidance.time_window import guess_time, time_window
 
 Array = NDArray[np.float64]
 
@@ -56,21 +58,22 @@ class ConvexTask:
         )
         return convex_template(chosen, self.tolerance).solve(scaled, self.least_error)
 
-    def refine(self, solution: ConvexSolution, reference: Array | None = None) -> ConvexSolution:
-        """Linearise anew until the true thrust bounds hold; unsolved if they cannot be met.
+    def refine(self, solution: ConvexSolution, reference: Array | None = None) -> tuple[ConvexSolution, int]:
+        """Linearise anew until the true thrust bounds hold.
 
         Args:
             solution: a solved answer of this task.
             reference: the log-mass it was linearised at; None if it was relaxed outward.
+
+        Returns:
+            The refined solution, unsolved if the bounds cannot be met; how many solves it took.
         """
-        for _ in range(_MOST_REFINEMENTS):
-            if bounds_hold(self.problem, solution, reference):
-                break
+        for solves in range(_MOST_REFINEMENTS):
+            if not solution.solved or bounds_hold(self.problem, solution, reference):
+                return solution, solves
             reference = solution.log_mass
             solution = self.solve(solution.time, reference)
-            if not solution.solved:
-                break
-        return solution
+        return solution, _MOST_REFINEMENTS
 
 
 def bounds_hold(problem: LandingProblem, solution: ConvexSolution, reference: Array | None) -> bool:
@@ -107,13 +110,13 @@ class TimeOutcome:
 
     Attributes:
         solution: the cheapest flight; None if no time tried was feasible.
-        window: the closed-form bounds that were searched.
-        tried: every fixed-time solution on the task's own nodes.
+        solves: conic solves that it took, coarse ones included.
+        cause: the limit that leaves no time of flight, by closed-form bounds; empty if they leave one.
     """
 
     solution: ConvexSolution | None
-    window: TimeWindow
-    tried: list[ConvexSolution]
+    solves: int
+    cause: str = ""
 
 
 def _asymptote(task: ConvexTask) -> float:
@@ -131,35 +134,66 @@ def minimise_over_time(
 ) -> TimeOutcome:
     """Search the time of flight of least cost.
 
-    The time, the thrust bounds' linearisation and the curvature of the cost come from a search on a coarse
-    mesh first, so that one or two solves are left for the fine one.
+    The indirect method guesses it, and one solve settles the matter where the dual solution says that no
+    other time is better by more than the tolerance. Elsewhere the time, the thrust bounds' linearisation and
+    the curvature of the cost come from a search on a coarse mesh first, so that one or two solves are left
+    for the fine one.
 
     Args:
         task: what is solved at each time.
         tolerance: gain below which the search stops, in units of the task's cost.
-        guess: [s] time to start from; None for coast and brake.
+        guess: [s] time to start from where the indirect method has none; None for coast and brake.
         coarse_first: False where the guess is good enough to go without the coarse mesh.
     """
+    if not task.free_landing_point:
+        outcome = _search_from_primer(task, tolerance)
+        if outcome is not None:
+            return outcome
     window = time_window(task.problem, task.free_landing_point)
     if window.empty:
-        return TimeOutcome(None, window, [])
+        return TimeOutcome(None, 0, window.cause)
     model = TimeModel(_asymptote(task), dead_time=0.75 if coarse_first else _NEAR_DEAD_TIME)
     reference: Array | None = None
     start = guess_time(task.problem, window) if guess is None else guess
     start = min(max(start, window.low), window.high)
+    solves = 0
     if coarse_first and task.nodes > 1.5 * _COARSE_NODES:
         coarse = replace(task, nodes=_COARSE_NODES, tolerance=1e-6)
         search = TimeSearch(coarse.solve, window, 2.0 * tolerance, model)
         found = search.run(start)
+        solves = len(search.samples)
         if found is not None:
             start, model = found.time, search.model
             if not bounds_hold(task.problem, found, None):
-                refined = coarse.refine(found)
+                refined, more = coarse.refine(found)
+                solves += more
                 reference = refined.log_mass if refined.solved else None
+    search = TimeSearch(_evaluation(task, reference), window, tolerance, model)
+    return TimeOutcome(search.run(start), solves + len(search.samples))
+
+
+def _evaluation(task: ConvexTask, reference: Array | None) -> Callable[[float], ConvexSolution]:
+    """Fixed-time solve with thrust bounds linearised at `reference`, or outward where that has no answer."""
 
     def evaluate(time: float) -> ConvexSolution:
         solution = task.solve(time, reference)
         return solution if solution.solved or reference is None else task.solve(time)
 
-    search = TimeSearch(evaluate, window, tolerance, model)
-    return TimeOutcome(search.run(start), window, search.samples)
+    return evaluate
+
+
+def _search_from_primer(task: ConvexTask, tolerance: float) -> TimeOutcome | None:
+    """Search from the indirect method's flight; None where it has none, or its time none on this mesh."""
+    flight = find_primer_flight(task.problem)
+    if flight is None:
+        return None
+    reference = flight.log_mass(task.nodes)
+    first = task.solve(flight.time, reference)
+    if not first.solved:
+        return None
+    model = TimeModel(_asymptote(task))
+    if model.gain(first) < tolerance:
+        return TimeOutcome(first, 1)
+    window = time_window(task.problem)
+    search = TimeSearch(_evaluation(task, reference), window, tolerance, model)
+    return TimeOutcome(search.run(flight.time, first), len(search.samples))

@@ -66,7 +66,8 @@ class Plan:
         landing_error: [m] distance from landing point to target; nan without a flight.
         message: the ending in words.
         certificate: why no flight exists, where the status is INFEASIBLE (or NEAREST, if proved).
-        solves: fixed-time optimisations that the plan cost.
+        solves: conic programmes (or nonlinear ones) that were solved for the plan, coarse ones and refinements
+            included.
     """
 
     status: PlanStatus

@@ -128,7 +128,7 @@ def test_each_limit_costs_propellant_and_is_kept(name, change):
     limited = replace(free, **change)
     cheap = ConvexTask(free, 61).solve(time)
     task = ConvexTask(limited, 61)
-    dear = task.refine(task.solve(time))
+    dear, _ = task.refine(task.solve(time))
     assert dear.solved
     assert dear.value > cheap.value * (1.0 + 1e-4)
     flight = dear.trajectory(limited)
