@@ -34,6 +34,8 @@ class AgentSettings:
         noise_decay: steps at which its linear decay begins and ends.
         saturation_weight: of the penalty that keeps a deterministic actor off the ends of its range (td3
             only; see `rl.td3.FastTD3`).
+        prior_weight: of the penalty that draws an actor to the nominal action where the critic sees no
+            difference (td3 only; see `rl.td3.FastTD3`).
         random_steps: steps with uniform actions before the first update.
         replay_size: transitions kept.
         matmul_precision: "highest" is float32; "medium" lets the processor multiply in bfloat16 where it can.
@@ -53,6 +55,7 @@ class AgentSettings:
     final_noise: float = 0.1
     noise_decay: tuple[int, int] = (40_000, 120_000)
     saturation_weight: float = 0.1
+    prior_weight: float = 0.01
     random_steps: int = 20_000
     replay_size: int = 400_000
     matmul_precision: Literal["highest", "high", "medium"] = "medium"
@@ -93,6 +96,7 @@ RECIPES: dict[str, AgentSettings] = {
         exploration_noise=0.1,
         final_noise=0.1,
         saturation_weight=0.0,
+        prior_weight=0.0,
         random_steps=25_000,
     ),
 }
@@ -142,6 +146,7 @@ def make_algorithm(settings: AgentSettings, env: Any, seed: int) -> OffPolicyAlg
     algorithm.lr_schedule = lambda _: settings.learning_rate_at(algorithm.num_timesteps)
     if isinstance(algorithm, FastTD3):
         algorithm.saturation_weight = settings.saturation_weight
+        algorithm.prior_weight = settings.prior_weight
     if settings.algorithm in ("td3", "ddpg"):
         algorithm.action_noise = ScheduledNoise(lambda: settings.noise_at(algorithm.num_timesteps))
     return algorithm
