@@ -30,7 +30,9 @@ from studies.monte_carlo import (
     local_processes,
     prepare_study,
 )
+from studies.paired import PairedDifference, compare_pairs, write_paired
 from studies.provenance import describe_study, write_provenance
+from studies.report import ReportContent, fly_report_flights, write_report
 from studies.rows import EpisodeRow
 from studies.study_folder import Existing, StudyFolder, open_study_folder
 from studies.table import (
@@ -60,6 +62,7 @@ class Comparison:
         resume: go on with the study in the folder, which must be the same; begins it where there is none.
         overwrite: replace the study in the folder.
         figures: draw the histograms and trajectories.
+        report: write report.html, and keep the flights that it shows.
     """
 
     episodes: int = 1000
@@ -72,6 +75,7 @@ class Comparison:
     resume: bool = False
     overwrite: bool = False
     figures: bool = True
+    report: bool = True
 
 
 def plan_study(options: Comparison) -> Study:
@@ -185,6 +189,15 @@ def summarize_study(study: Study, rows: tuple[EpisodeRow, ...]) -> list[PolicySu
     ]
 
 
+def compare_study(study: Study, rows: tuple[EpisodeRow, ...]) -> list[PairedDifference]:
+    """Compare every policy of the study with the reference policy, whose rows must be among `rows`."""
+    by_policy: dict[str, Sequence[EpisodeRow]] = {
+        name: [row for row in rows if row.policy == name] for name in study.policies
+    }
+    reference = [row for row in rows if row.policy == REFERENCE_POLICY]
+    return compare_pairs(by_policy, reference, study.study_seed)
+
+
 def compare(options: Comparison) -> list[PolicySummary]:
     """Fly the comparison and write its folder: tables, provenance, figures, trajectories.
 
@@ -198,29 +211,48 @@ def compare(options: Comparison) -> list[PolicySummary]:
     out = open_folder(options.out or Path("results") / study.preset.name)
     with open_study_folder(out, with_reference(study), existing) as folder:
         flown = fly_with_progress(folder, options.workers)
-        summaries = write_results(folder, study, flown, options.figures)
+        summaries = write_results(folder, study, flown, options)
     print_table(summaries)
     Console().print(f"results in {out}")
     return summaries
 
 
 def write_results(
-    folder: StudyFolder, study: Study, flown: StudyResult, figures: bool
+    folder: StudyFolder, study: Study, flown: StudyResult, options: Comparison
 ) -> list[PolicySummary]:
-    """Write every product of a flown study; the provenance comes last and says that it is complete."""
+    """Write every product of a flown study."""
     out = folder.path
     rows = tuple(row for row in flown.rows if row.policy in study.policies)
     summaries = summarize_study(study, flown.rows)
+    differences = compare_study(study, flown.rows)
+    provenance = describe_study(folder.study, folder.describe_flight())
     write_episodes(out, rows)
     write_table(out / "table.csv", summaries)
     write_markdown(out / "table.md", summaries)
+    write_paired(out / "paired.csv", differences)
     write_timings(out / "timings.csv", {name: flown.decision_time[name] for name in study.policies})
-    if figures:
+    if options.figures:
         from studies.figures import draw_figures
 
         draw_figures(out, study, rows)
-    write_provenance(out / "provenance.json", describe_study(folder.study, folder.describe_flight()))
+    if options.report:
+        report_study(out, ReportContent(study, rows, summaries, differences, provenance), options.workers)
+    write_provenance(out / "provenance.json", provenance)
     return summaries
+
+
+def report_study(out: Path, content: ReportContent, workers: int) -> None:
+    """Fly again what the report shows, under a progress bar, and write it."""
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, transient=True) as progress:
+        task = progress.add_task("report", total=None)
+        flights = fly_report_flights(
+            content,
+            partial(local_processes, workers),
+            out / "trajectories",
+            lambda done, total: progress.update(task, completed=done, total=total),
+        )
+    write_report(out / "report.html", content, flights)
 
 
 def main() -> None:

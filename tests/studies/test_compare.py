@@ -31,19 +31,19 @@ def flown(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_two_workers_give_the_same_bytes(flown: Path, tmp_path: Path) -> None:
     policies = ("no-divert", "single-divert", "nearest-safe", "oracle")
-    again = run(tmp_path / "two", workers=2, policies=policies, figures=False)
+    again = run(tmp_path / "two", workers=2, policies=policies, figures=False, report=False)
     assert contents(again) == contents(flown)
 
 
 def test_order_of_policies_changes_nothing(flown: Path, tmp_path: Path) -> None:
     policies = ("oracle", "nearest-safe", "no-divert", "single-divert", "oracle")
-    again = run(tmp_path / "order", workers=1, policies=policies, figures=False)
+    again = run(tmp_path / "order", workers=1, policies=policies, figures=False, report=False)
     assert contents(again) == contents(flown)
 
 
 @pytest.mark.parametrize("policy", ["nearest-safe", "single-divert", "oracle"])
 def test_a_subset_gives_the_same_lines(flown: Path, tmp_path: Path, policy: str) -> None:
-    alone = run(tmp_path / "alone", workers=1, policies=(policy,), figures=False)
+    alone = run(tmp_path / "alone", workers=1, policies=(policy,), figures=False, report=False)
     for name in ("episodes.csv", "table.csv"):
         lines = (flown / name).read_text().splitlines()
         expected = [lines[0], *(line for line in lines[1:] if line.startswith(f"{policy},"))]
@@ -51,11 +51,19 @@ def test_a_subset_gives_the_same_lines(flown: Path, tmp_path: Path, policy: str)
 
 
 def test_every_file_is_there(flown: Path) -> None:
-    for name in ("episodes.csv", "episodes.parquet", "table.csv", "timings.csv", "provenance.json"):
+    for name in (
+        "episodes.csv",
+        "episodes.parquet",
+        "table.csv",
+        "paired.csv",
+        "timings.csv",
+        "provenance.json",
+    ):
         assert (flown / name).stat().st_size > 0
     assert (flown / "figures" / "histograms.png").read_bytes().startswith(b"\x89PNG")
     assert len(list((flown / "figures").glob("trajectory-*.png"))) == 4
-    assert len(list((flown / "trajectories").glob("*.npz"))) == 4
+    assert len(list((flown / "trajectories").glob("*.npz"))) >= 4
+    assert (flown / "report.html").read_text().startswith("<!doctype html>")
 
 
 def test_provenance_says_how_to_make_it_again(flown: Path) -> None:

@@ -26,7 +26,7 @@ STUDY = Study(PRESETS["paper"], POLICIES, 30)
 
 
 def options(out: Path, **changes: Any) -> Comparison:
-    plain = Comparison(episodes=EPISODES, policies=POLICIES, workers=1, out=out, figures=False)
+    plain = Comparison(episodes=EPISODES, policies=POLICIES, workers=1, out=out, figures=False, report=False)
     return replace(plain, **changes)
 
 
@@ -43,7 +43,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def start(out: Path, workers: int) -> subprocess.Popen[str]:
     command = [sys.executable, "-m", "studies.compare", "--episodes", str(EPISODES), "--policies", *POLICIES]
-    command += ["--workers", str(workers), "--no-figures", "--resume", "--out", str(out)]
+    command += ["--workers", str(workers), "--no-figures", "--no-report", "--resume", "--out", str(out)]
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
 
 
