@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from guidance.lander import Lander
 from guidance.state import State
+from hda.lidar import Lidar
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,6 +25,7 @@ class ScenarioView:
         control_period: [s] time over which a thrust is held.
         field_of_view: [rad] the look's width is the slant range times its tangent.
         off_nadir_limit: [rad] pixels further than this from the vertical read 0.
+        lidar: the sensor, with its known noise.
     """
 
     lander: Lander
@@ -33,6 +35,7 @@ class ScenarioView:
     control_period: float
     field_of_view: float
     off_nadir_limit: float
+    lidar: Lidar
 
 
 @dataclass(frozen=True, eq=False)

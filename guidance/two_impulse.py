@@ -1,0 +1,105 @@
+"""Cheap estimate of the velocity change that a soft landing costs: two impulses and their gravity losses.
+
+The least-propellant descent coasts between a first and a last burn. With both taken as impulses, a flight of
+T seconds from r, v to rest at s needs v_1 = (s - r - g T^2/2)/T after the first and brakes v_2 = v_1 + g T,
+so it costs |v_1 - v| + |v_2|. A burn of finite thrust acceleration a lasts t = |dv|/a. The first acts as if
+it came t/2 late, so it needs |dv| (1 + t/2T); the last, begun earlier, at a lower speed, costs a vertical
+descent |v_2| sqrt(a/(a - |g|)), about |v_2| (1 + |g|/2a). The best T is found by golden section. The
+differences between sites, which choose among them, are good to a few percent until the last burn begins.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from guidance.kernel import compile_kernel
+from guidance.lander import Lander
+from guidance.state import State
+from guidance.validation import finite_vector
+
+_SHORTEST, _LONGEST = 0.2, 1.5  # times of flight searched, in free falls to the plane
+_SECTIONS = 22  # of the golden section: 1e-4 of the interval
+_GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
+
+
+@compile_kernel
+def _cost(east: float, north: float, up: float, motion: NDArray[np.float64], time: float) -> float:
+    """[m/s] at one time of flight; `motion` is (velocity (3), pull, greatest acceleration)."""
+    vx, vy, vz, pull, push = motion
+    first_x, first_y = east / time, north / time
+    first_z = (up + 0.5 * pull * time * time) / time
+    first = math.sqrt((first_x - vx) ** 2 + (first_y - vy) ** 2 + (first_z - vz) ** 2)
+    last = math.sqrt(first_x**2 + first_y**2 + (first_z - pull * time) ** 2)
+    return first + last + 0.5 * (pull * last / push + first * first / (push * time))
+
+
+@compile_kernel
+def least_cost(east: float, north: float, up: float, motion: NDArray[np.float64]) -> tuple[float, float]:
+    """(velocity change [m/s], time of flight [s]) of the cheapest two-impulse landing at an offset [m]."""
+    sink, pull = motion[2], motion[3]
+    fall = (sink + math.sqrt(max(sink * sink - 2.0 * pull * up, 0.0))) / pull
+    low, high = _SHORTEST * fall, _LONGEST * fall
+    left, right = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
+    at_left, at_right = _cost(east, north, up, motion, left), _cost(east, north, up, motion, right)
+    for _ in range(_SECTIONS):
+        if at_left < at_right:
+            high, right, at_right = right, left, at_left
+            left = high - _GOLDEN * (high - low)
+            at_left = _cost(east, north, up, motion, left)
+        else:
+            low, left, at_left = left, right, at_right
+            right = low + _GOLDEN * (high - low)
+            at_right = _cost(east, north, up, motion, right)
+    return (at_left, left) if at_left < at_right else (at_right, right)
+
+
+@compile_kernel
+def _fill(
+    east: NDArray[np.float64],
+    north: NDArray[np.float64],
+    up: float,
+    motion: NDArray[np.float64],
+    out: NDArray[np.float64],
+) -> None:
+    for row in range(north.size):
+        for column in range(east.size):
+            out[row, column] = least_cost(east[column], north[row], up, motion)[0]
+
+
+def divert_cost(
+    state: State,
+    east: NDArray[np.float64],
+    north: NDArray[np.float64],
+    plane: float,
+    lander: Lander,
+    gravity: ArrayLike,
+) -> NDArray[np.float64]:
+    """Estimated propellant to land softly at each point of a lattice.
+
+    Args:
+        state: start, above the plane.
+        east: [m] shape (m,), x of the lattice's columns.
+        north: [m] shape (n,), y of its rows.
+        plane: [m] height of the ground.
+        lander: the vehicle, at full thrust in both burns.
+        gravity: [m/s^2] shape (3,), along -z.
+
+    Returns:
+        [kg] shape (n, m).
+
+    Raises:
+        ValueError: the state is not above the plane, or gravity does not point along -z.
+    """
+    pull = finite_vector("gravity", gravity, 3)
+    if pull[0] != 0.0 or pull[1] != 0.0 or pull[2] >= 0.0:
+        raise ValueError(f"gravity must point along -z, got {pull.tolist()}")
+    if state.position[2] <= plane:
+        raise ValueError(f"state: altitude {state.position[2]:g} m must be above the plane, {plane:g} m")
+    motion = np.array([*state.velocity, -pull[2], lander.max_thrust / state.mass])
+    out = np.empty((north.size, east.size))
+    x, y, z = state.position
+    _fill(np.asarray(east - x), np.asarray(north - y), float(plane - z), motion, out)
+    return state.mass * -np.expm1(-out / lander.exhaust_velocity)

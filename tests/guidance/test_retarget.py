@@ -1,0 +1,66 @@
+"""A shifted descent: ends where asked, keeps its time and height, and costs what the quintic says."""
+
+import numpy as np
+import pytest
+from descents import GRAVITY, TARGET
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from guidance import PAPER_LANDER, State
+from guidance.retarget import shift_landing_point, velocity_change, within_thrust
+from guidance.soft_landing import plan_soft_landing
+from guidance.tracking import TrackingReference, make_reference
+
+PERIOD = 0.5
+
+
+@pytest.fixture(scope="module")
+def descent() -> TrackingReference:
+    start = State(np.array([200.0, 60.0, 950.0]), np.array([-7.0, -2.0, -25.0]), 1200.0)
+    reference = plan_soft_landing(start, TARGET, PAPER_LANDER, PERIOD).reference
+    assert reference is not None
+    return reference
+
+
+@settings(max_examples=40)
+@given(x=st.floats(-20.0, 20.0), y=st.floats(-20.0, 20.0), flown=st.sampled_from([0, 20, 40]))
+def test_it_starts_as_it_is_and_ends_at_rest_on_the_new_site(descent, x, y, flown):
+    left = descent.after(flown)
+    site = TARGET + np.array([x, y, 0.0])
+    shifted = shift_landing_point(left, site, GRAVITY)
+    np.testing.assert_allclose(shifted.position[0], left.position[0], atol=1e-9)
+    np.testing.assert_allclose(shifted.velocity[0], left.velocity[0], atol=1e-9)
+    np.testing.assert_allclose(shifted.position[-1], site, atol=1e-9)
+    np.testing.assert_allclose(shifted.velocity[-1], 0.0, atol=1e-6)
+    np.testing.assert_allclose(shifted.position[:, 2], left.position[:, 2], atol=1e-6)
+    assert shifted.duration == left.duration
+
+
+def test_its_acceleration_integrates_to_its_velocity(descent):
+    shifted = shift_landing_point(descent, TARGET + np.array([15.0, -5.0, 0.0]), GRAVITY)
+    step = PERIOD * (shifted.thrust_acceleration + GRAVITY)
+    np.testing.assert_allclose(np.diff(shifted.velocity, axis=0), step, atol=1e-12)
+    mean = 0.5 * (shifted.velocity[1:] + shifted.velocity[:-1])
+    gap = np.diff(shifted.position, axis=0) - np.diff(descent.position, axis=0)
+    old = 0.5 * (descent.velocity[1:] + descent.velocity[:-1])
+    np.testing.assert_allclose(gap, PERIOD * (mean - old), atol=2e-3)  # the trapezoidal rule's error
+
+
+def test_the_greatest_acceleration_is_5_77_offsets_over_the_time_squared():
+    count = 400
+    hover = make_reference(np.tile(TARGET, (count, 1)), np.zeros((count, 3)), 0.02, GRAVITY)
+    shifted = shift_landing_point(hover, TARGET + np.array([10.0, 0.0, 0.0]), GRAVITY)
+    across = np.abs(shifted.thrust_acceleration[:, 0]).max()
+    assert across == pytest.approx(5.7735 * 10.0 / hover.duration**2, rel=1e-3)
+    assert velocity_change(hover) == pytest.approx(1.62 * hover.duration, rel=1e-9)
+    assert velocity_change(shifted) > velocity_change(hover)
+
+
+def test_thrust_is_judged_at_the_start_mass(descent):
+    push = np.linalg.norm(descent.thrust_acceleration, axis=1).max() * 1200.0
+    spare = 1.0 - push / PAPER_LANDER.max_thrust
+    assert 0.0 < spare < 0.2
+    assert within_thrust(descent, PAPER_LANDER, 1200.0, spare - 1e-6)
+    assert not within_thrust(descent, PAPER_LANDER, 1200.0, spare + 1e-6)
+    far = shift_landing_point(descent.after(45), TARGET + np.array([200.0, 0.0, 0.0]), GRAVITY)
+    assert not within_thrust(far, PAPER_LANDER, 1200.0, 0.05)
