@@ -106,6 +106,9 @@ class StartConditions:
         target_area: [m] x and y of the first target lie in this range.
         hazard_radius: [m] radius around the first target within which ...
         hazard_share: ... at least this share of the ground is unsafe.
+
+    Raises:
+        ValueError: a field is out of range.
     """
 
     altitude: Range = Range(900.0, 1000.0)
@@ -117,6 +120,14 @@ class StartConditions:
     target_area: Range = Range(250.0, 750.0)
     hazard_radius: float = 100.0
     hazard_share: float = 0.8
+
+    def __post_init__(self) -> None:
+        """Refuse starts that mean nothing."""
+        for name in ("distance", "descent_speed", "horizontal_speed"):
+            finite_number(f"{name}.low", getattr(self, name).low, at_least=0.0)
+        finite_number("approach_spread", self.approach_spread, at_least=0.0, at_most=math.pi)
+        finite_number("hazard_radius", self.hazard_radius, above=0.0)
+        finite_number("hazard_share", self.hazard_share, at_least=0.0, at_most=1.0)
 
 
 @dataclass(frozen=True)
