@@ -33,7 +33,7 @@ class Rows:
         bound: b.
         value_power: p for each entry, where the entry goes with the time of flight as T^p; scalar or like
             value.
-        bound_power: the same for b.
+        bound_rate: T db/dT of each bound; scalar or like `bound`.
     """
 
     name: str
@@ -44,7 +44,7 @@ class Rows:
     value: Array
     bound: Array
     value_power: Array = field(default_factory=lambda: np.zeros(1))
-    bound_power: Array = field(default_factory=lambda: np.zeros(1))
+    bound_rate: Array = field(default_factory=lambda: np.zeros(1))
 
     def left_over(self, decision: Array) -> Array:
         """Slack b - A x, shape (cones, cone_size) (one cone for 'zero' and 'nonnegative')."""
@@ -75,8 +75,8 @@ def start(layout: Layout, scaled: ScaledProblem) -> Rows:
     """Position, velocity and log-mass at the first node."""
     column = np.arange(7)
     bound = np.concatenate([scaled.position, scaled.velocity, [0.0]])
-    power = np.array([-2.0] * 3 + [-1.0] * 3 + [0.0])
-    return Rows("start", "zero", 7, np.arange(7), column, np.ones(7), bound, bound_power=power)
+    rate = np.concatenate([-2.0 * scaled.position, -scaled.velocity, [0.0]])
+    return Rows("start", "zero", 7, np.arange(7), column, np.ones(7), bound, bound_rate=rate)
 
 
 @lru_cache(maxsize=64)
@@ -191,7 +191,7 @@ def speed_limit(layout: Layout, scaled: ScaledProblem) -> Rows:
         velocity.ravel(),
         -np.ones(velocity.size),
         bound.ravel(),
-        bound_power=np.array([-1.0]),
+        bound_rate=-bound.ravel(),
     )
 
 
@@ -205,7 +205,7 @@ def dry_mass(layout: Layout, scaled: ScaledProblem) -> Rows:
         layout.log_mass[-1:],
         -np.ones(1),
         np.array([scaled.propellant]),
-        bound_power=np.array([-1.0]),
+        bound_rate=np.array([-scaled.propellant]),
     )
 
 
@@ -225,5 +225,5 @@ def landing_error_limit(layout: Layout, scaled: ScaledProblem) -> Rows:
         np.array([layout.landing_error]),
         np.ones(1),
         np.array([scaled.error_limit]),
-        bound_power=np.array([-2.0]),
+        bound_rate=np.array([-2.0 * scaled.error_limit]),
     )

@@ -9,14 +9,16 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from guidance import constraints
+from guidance import condensed, constraints
 from guidance.clarabel_solver import ConicAnswer, ConicSolver, SolveStatus
+from guidance.condensed import CondensedLayout
 from guidance.constraints import Rows
 from guidance.layout import Layout
 from guidance.problem import LandingProblem
@@ -24,7 +26,7 @@ from guidance.scaling import ScaledProblem, scale_problem
 from guidance.state import State
 
 Array = NDArray[np.float64]
-Family = Callable[[Layout, ScaledProblem], Rows]
+Family = Callable[[Any, ScaledProblem], Rows]  # a Layout or a CondensedLayout
 
 
 @dataclass(frozen=True)
@@ -80,16 +82,35 @@ class ConstraintSet:
         ]
         return [family for wanted, family in chosen if wanted]
 
+    @property
+    def can_condense(self) -> bool:
+        """Whether the problem without its states says all but the altitude floor."""
+        return not (self.glide_slope or self.speed_limit or self.free_landing_point)
+
+    @property
+    def condensed_families(self) -> list[Family]:
+        """Constraint functions of the problem without its states, in row order."""
+        chosen: list[tuple[bool, Family]] = [
+            (True, condensed.burnt_mass),
+            (True, condensed.landing_moments),
+            (True, constraints.max_thrust),
+            (self.min_thrust, constraints.min_thrust),
+            (self.pointing, constraints.pointing),
+            (True, constraints.dry_mass),
+            (True, constraints.thrust_cone),
+        ]
+        return [family for wanted, family in chosen if wanted]
+
 
 @dataclass(frozen=True, eq=False)
 class ConvexSolution:
     """Answer of one fixed-time solve.
 
     Attributes:
-        answer: the conic solver's answer, in scaled units.
-        layout: indices into it.
+        answer: the conic solver's answer, in scaled units; its dual solution belongs to `rows`.
+        layout: indices into the primal one.
         scaled: the numbers it was solved with.
-        rows: the constraint rows it was solved with.
+        rows: the constraint rows it was solved with, condensed or whole.
         value: what was minimised: ln(start mass / final mass), or the landing error [m].
         slope: derivative of `value` with respect to the time of flight, from the dual solution.
     """
@@ -145,17 +166,29 @@ class ConvexSolution:
 class ConvexTemplate:
     """The assembled problem of one ConstraintSet."""
 
-    def __init__(self, constraint_set: ConstraintSet, tolerance: float = 1e-8) -> None:
-        """Fix sparsity and scaling from nominal numbers that no caller can change."""
+    def __init__(
+        self, constraint_set: ConstraintSet, tolerance: float = 1e-8, condensed: bool = False
+    ) -> None:
+        """Fix sparsity and scaling from nominal numbers that no caller can change.
+
+        Args:
+            constraint_set: what is asked.
+            tolerance: of the conic solver.
+            condensed: leave out the states, and with them the altitude floor.
+        """
         from scipy.sparse import csc_matrix
 
-        self.layout = Layout(constraint_set.nodes, constraint_set.free_landing_point)
-        self._families = constraint_set.families
+        self._whole = Layout(constraint_set.nodes, constraint_set.free_landing_point)
+        self._condensed = CondensedLayout(constraint_set.nodes) if condensed else None
+        self.layout = self._condensed or self._whole
+        self._families = constraint_set.condensed_families if condensed else constraint_set.families
         self._constant: dict[Family, Rows] = {}
         nominal = _nominal_numbers(constraint_set.nodes)
         rows = self.rows(nominal)
-        for family in (constraints.landing, constraints.altitude_floor, constraints.thrust_cone):
-            self._constant[family] = family(self.layout, nominal)
+        fixed: list[Family] = [constraints.landing, constraints.altitude_floor, constraints.thrust_cone]
+        for family in fixed:
+            if family in self._families:
+                self._constant[family] = family(self.layout, nominal)
         first = np.cumsum([0] + [part.bound.size for part in rows])
         self._row = np.concatenate([part.row + offset for part, offset in zip(rows, first, strict=False)])
         self._column = np.concatenate([part.column for part in rows])
@@ -181,7 +214,7 @@ class ConvexTemplate:
         """Cost vector: the landing error, or the negative final log-mass."""
         cost = np.zeros(self.layout.size)
         if least_error:
-            cost[self.layout.landing_error] = 1.0
+            cost[self._whole.landing_error] = 1.0
         else:
             cost[self.layout.log_mass[-1]] = -1.0
         return cost
@@ -192,16 +225,19 @@ class ConvexTemplate:
         values, bound = self._numbers(rows)
         cost = self.cost(least_error)
         answer = self._solver.solve(values[self._order], bound, cost)
-        if answer.status in (SolveStatus.FAILED, SolveStatus.LIMIT_REACHED):
+        unsure = answer.status in (SolveStatus.FAILED, SolveStatus.LIMIT_REACHED)
+        if unsure and self._condensed is None:
             self._careful = self._careful or ConicSolver(*self._assembled, refine=True)
             answer = self._careful.solve(values[self._order], bound, cost)
         if answer.status is not SolveStatus.SOLVED:
-            return ConvexSolution(answer, self.layout, scaled, rows, np.nan, np.nan)
+            return ConvexSolution(answer, self._whole, scaled, rows, np.nan, np.nan)
         unit, power = (scaled.length, 2) if least_error else (scaled.kappa, 1)
         value = float(cost @ answer.primal)
         sensitivity = self._sensitivity(rows, answer)
         slope = unit * (power * value + sensitivity) / scaled.time
-        return ConvexSolution(answer, self.layout, scaled, rows, unit * value, slope)
+        if self._condensed is not None:
+            answer = replace(answer, primal=condensed.expand(self._condensed, scaled, answer.primal))
+        return ConvexSolution(answer, self._whole, scaled, rows, unit * value, slope)
 
     def _sensitivity(self, rows: list[Rows], answer: ConicAnswer) -> float:
         """T d(optimum)/dT at fixed units: dual' (T dA/dT x - T db/dT), each number being a power of T."""
@@ -212,8 +248,8 @@ class ConvexTemplate:
             if part.value_power.any():
                 weight = part.value_power * part.value * answer.primal[part.column]
                 total += float(dual[part.row] @ weight)
-            if part.bound_power.any():
-                total -= float(dual @ (part.bound_power * part.bound))
+            if part.bound_rate.any():
+                total -= float(np.sum(dual * part.bound_rate))
         return total
 
 
@@ -247,16 +283,18 @@ class _TemplateCache(threading.local):
     """Templates of one thread: a solver object must not be shared while it solves."""
 
     def __init__(self) -> None:
-        self.templates: dict[tuple[ConstraintSet, float], ConvexTemplate] = {}
+        self.templates: dict[tuple[ConstraintSet, float, bool], ConvexTemplate] = {}
 
 
 _CACHE = _TemplateCache()
 
 
-def convex_template(constraint_set: ConstraintSet, tolerance: float = 1e-8) -> ConvexTemplate:
+def convex_template(
+    constraint_set: ConstraintSet, tolerance: float = 1e-8, condensed: bool = False
+) -> ConvexTemplate:
     """The assembled problem for a constraint set: built once per thread, then kept."""
-    key = (constraint_set, tolerance)
+    key = (constraint_set, tolerance, condensed)
     template = _CACHE.templates.get(key)
     if template is None:
-        template = _CACHE.templates[key] = ConvexTemplate(constraint_set, tolerance)
+        template = _CACHE.templates[key] = ConvexTemplate(*key)
     return template

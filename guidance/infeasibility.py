@@ -21,7 +21,7 @@ def prove_at(task: ConvexTask, time: float) -> FarkasProof | ConvexSolution:
     certificate is the proof. Where it is feasible, but its cheapest flight overdraws the tank, the dual
     solution y of "propellant >= y-bound" becomes a proof by giving the tank's row the multiplier one.
     """
-    cheapest = replace(task, least_error=False, limit_propellant=False)
+    cheapest = replace(task, least_error=False, limit_propellant=False, condense=False)
     solution = cheapest.solve(time)
     if solution.answer.status not in (SolveStatus.SOLVED, SolveStatus.INFEASIBLE):
         return solution

@@ -8,6 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from guidance.clarabel_solver import SolveStatus
+from guidance.condensed import keeps_altitude
 from guidance.convex import ConstraintSet, ConvexSolution, convex_template
 from guidance.flight_time import TimeModel, TimeSearch
 from guidance.primer_vector import find_primer_flight
@@ -37,6 +39,8 @@ class ConvexTask:
         error_limit: [m] greatest landing error; None for none.
         limit_propellant: whether the dry mass bounds the flight (see `guidance.scaling.scale_problem`).
         tolerance: of the conic solver.
+        condense: whether to try the problem without its states first; False where the dual solution of the
+            whole problem is wanted.
     """
 
     problem: LandingProblem
@@ -46,6 +50,7 @@ class ConvexTask:
     error_limit: float | None = None
     limit_propellant: bool = False
     tolerance: float = 1e-8
+    condense: bool = True
 
     def solve(self, time: float, log_mass: Array | None = None) -> ConvexSolution:
         """One conic solve; thrust bounds linearised at `log_mass` (any length), or outward if None."""
@@ -56,6 +61,12 @@ class ConvexTask:
         scaled = scale_problem(
             self.problem, time, self.nodes, log_mass, self.error_limit, self.limit_propellant
         )
+        if self.condense and chosen.can_condense:
+            solution = convex_template(chosen, self.tolerance, condensed=True).solve(scaled)
+            if solution.solved and keeps_altitude(solution.layout, solution.answer.primal):
+                return solution
+            if solution.answer.status is SolveStatus.INFEASIBLE:
+                return solution
         return convex_template(chosen, self.tolerance).solve(scaled, self.least_error)
 
     def refine(self, solution: ConvexSolution, reference: Array | None = None) -> tuple[ConvexSolution, int]:

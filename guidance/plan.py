@@ -66,8 +66,8 @@ class Plan:
         landing_error: [m] distance from landing point to target; nan without a flight.
         message: the ending in words.
         certificate: why no flight exists, where the status is INFEASIBLE (or NEAREST, if proved).
-        solves: conic programmes (or nonlinear ones) that were solved for the plan, coarse ones and refinements
-            included.
+        solves: conic (or nonlinear) programmes solved on the way, coarse ones and refinements included;
+            those of proofs are not.
     """
 
     status: PlanStatus

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from guidance import Lander, State, constraints
+from guidance.condensed import CondensedLayout, burnt_mass, landing_moments
+from guidance.convex import Family
 from guidance.dynamics import integrate
 from guidance.layout import Layout
 from guidance.problem import LandingProblem
@@ -212,11 +214,13 @@ def test_motion_is_the_true_motion():
     assert rows.violation(x) > 1e-4
 
 
-def test_powers_of_time_are_what_the_numbers_do():
-    """Each family declares how its numbers go with T; scaling anew at 2 T must agree."""
-    twice = scale_problem(PROBLEM, 2.0 * TIME, NODES, np.zeros(NODES), 3.0, True)
-    once = scale_problem(PROBLEM, TIME, NODES, np.zeros(NODES), 3.0, True)
-    families = [
+def test_numbers_go_with_time_as_declared():
+    """Each family declares how its numbers go with T; scaling anew at other times must agree."""
+
+    def scaled(time):
+        return scale_problem(PROBLEM, time, NODES, np.zeros(NODES), 3.0, True)
+
+    whole: list[Family] = [
         constraints.start,
         constraints.motion,
         constraints.max_thrust,
@@ -227,7 +231,12 @@ def test_powers_of_time_are_what_the_numbers_do():
         constraints.dry_mass,
         constraints.landing_error_limit,
     ]
-    for family in families:
-        a, b = family(FREE, once), family(FREE, twice)
-        np.testing.assert_allclose(b.value, a.value * 2.0**a.value_power, rtol=1e-12)
-        np.testing.assert_allclose(b.bound, a.bound * 2.0**a.bound_power, rtol=1e-12)
+    condensed: list[Family] = [burnt_mass, landing_moments, constraints.max_thrust, constraints.dry_mass]
+    step = 1e-5
+    for layout, families in ((FREE, whole), (CondensedLayout(NODES), condensed)):
+        for family in families:
+            a, b = family(layout, scaled(TIME)), family(layout, scaled(2.0 * TIME))
+            np.testing.assert_allclose(b.value, a.value * 2.0**a.value_power, rtol=1e-12)
+            later, sooner = (family(layout, scaled(TIME * (1.0 + s))).bound for s in (step, -step))
+            rate = np.broadcast_to(a.bound_rate, a.bound.shape)
+            np.testing.assert_allclose((later - sooner) / (2.0 * step), rate, rtol=1e-8, atol=1e-10)

@@ -22,13 +22,14 @@ def paper_problem(rng):
     return LandingProblem(State.parse(paper_start(rng)), TARGET, PAPER_LANDER, np.array(MOON_GRAVITY))
 
 
-def test_bits_do_not_depend_on_what_was_solved_before():
+@pytest.mark.parametrize("condensed", [False, True])
+def test_bits_do_not_depend_on_what_was_solved_before(condensed):
     rng = np.random.default_rng(0)
     problems = [paper_problem(rng) for _ in range(4)]
     problems.append(replace(problems[0], state=State.parse([0, 0, 110, 0, 0, -60, 1200])))  # infeasible
     scaled = [scale_problem(problem, 26.0, NODES) for problem in problems]
-    first = ConvexTemplate(ConstraintSet(NODES))
-    second = ConvexTemplate(ConstraintSet(NODES))
+    first = ConvexTemplate(ConstraintSet(NODES), condensed=condensed)
+    second = ConvexTemplate(ConstraintSet(NODES), condensed=condensed)
     for number in scaled:
         first.solve(number)
     forward = [first.solve(number).answer for number in scaled]

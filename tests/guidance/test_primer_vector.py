@@ -63,7 +63,7 @@ def check_optimality(problem: LandingProblem, flight: PrimerFlight):
         velocity = fly(problem, flight, time).velocity if time > 0.0 else problem.state.velocity
         primer = q1 + slope * (time - begin)
         terms = float(primer @ problem.gravity), float(slope @ velocity)
-        assert terms[0] - terms[1] == pytest.approx(0.0, abs=1e-6 * np.linalg.norm(problem.gravity))
+        assert terms[0] - terms[1] == pytest.approx(0.0, abs=1e-6 * float(np.linalg.norm(problem.gravity)))
         assert np.linalg.norm(primer) < 1.0 + 1e-9
     assert np.linalg.norm([q1, q2], axis=1) == pytest.approx(1.0)
     assert flight.first_burn == max(begin, 0.0) < stop == flight.braking < flight.time
