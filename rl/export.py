@@ -59,6 +59,20 @@ def settings_from_json(values: dict[str, Any]) -> AgentSettings:
     return AgentSettings(**{**values, **{k: tuple(v) for k, v in values.items() if isinstance(v, list)}})
 
 
+def training_command(card: dict[str, Any], seed: int) -> str:
+    """The command that trains a run as its card says: settings that differ from the recipe's become flags."""
+    from rl.algorithms import RECIPES
+
+    recipe = json.loads(json.dumps(asdict(RECIPES[card["recipe"]])))
+    parts = ["python -m rl.train", card["recipe"], f"--seed {seed}", f"--preset {card['preset']}"]
+    parts.append(f"--steps {card['plan']['steps']}")
+    for name, value in card["settings"].items():
+        if value != recipe[name]:
+            values = value if isinstance(value, list) else [value]
+            parts.append(" ".join([f"--{name.replace('_', '-')}", *(str(v) for v in values)]))
+    return " ".join(parts)
+
+
 def best_of_run(
     run: Path, preset: Preset, settings: AgentSettings, options: ExportWeights, seed: int
 ) -> Candidate:
@@ -131,8 +145,7 @@ def run_export(options: ExportWeights) -> None:
         for row in read_rows(chosen.run / "validation.csv")
     ]
     training = {
-        "command": f"python -m rl.train {first['recipe']} --seed {chosen.seed}"
-        f" --preset {preset.name} --steps {first['plan']['steps']}",
+        "command": training_command(first, chosen.seed),
         "settings": asdict(settings),
         "preset": preset.name,
         "ground": Ground(preset.terrain, preset.criteria).key,
