@@ -18,10 +18,10 @@ from hda.scenario import Preset, Scenario
 from rl.action import PAPER_ACTIONS, ActionRanges, decide_action
 from rl.dispersions import Dispersions
 from rl.encoding import (
+    CURVED,
     LATENT_BOUND,
     LATENT_SIZE,
     LAYOUTS,
-    RELATIVE,
     Layout,
     encode_flight,
     encode_observation,
@@ -187,25 +187,25 @@ class LandingEnv(gymnasium.Env[ObsType, NDArray[np.float32]], Generic[ObsType]):
 
 
 class LunarHDAEnv(LandingEnv[NDArray[np.float32]]):
-    """`LunarHDA-v0`: the 44 numbers that the agents see; float32, each (value - center) / scale, clipped.
+    """`LunarHDA-v0`: the 44 numbers that the agents see; float32, clipped to finite bounds.
 
-    | index | meaning | center | scale |
-    |---|---|---|---|
-    | 0, 1 | position east, north of the current target, m | 0 | 200 |
-    | 2 | height above the target, m | 450 | 450 |
-    | 3, 4 | velocity east, north, m/s | 0 | 20 |
-    | 5 | velocity up, m/s | -20 | 20 |
-    | 6 | mass, kg | 1175 | 25 |
-    | 7 | width of the look, m | 100 | 100 |
-    | 8 | time to go, s | 20 | 20 |
-    | 9, 10 | current target east, north of the first one, m | 0 | 100 |
-    | 11 | current target above the first one, m: always 0 | 0 | 100 |
-    | 12-43 | latent of the safety map, about normal over random rollouts | 0 | 1 |
+    x = (value - center) / scale; where "curved", asinh(x) / 2: fine near the ground and coarse above.
 
-    Bounds: -8 to 8 in general, -5 to 5 for velocities, -1 to 8 for height and width, -2 to 8 for the time
-    to go. With `layout="printed"` elements 0-11 are as the paper prints them: position (center 500, scale
-    500; height scale 450), velocity, mass, width twice, target (center 500, 500 and 50, scale 500; the last
-    is always 0). Rewards, actions and options: `LandingEnv`.
+    | index | meaning | center | scale | |
+    |---|---|---|---|---|
+    | 0, 1 | position east, north of the current target, m | 0 | 5 | curved |
+    | 2 | height above the target, m | 0 | 5 | curved |
+    | 3, 4, 5 | velocity east, north, up, m/s | 0 | 2 | curved |
+    | 6 | mass, kg | 1175 | 25 | |
+    | 7 | width of the look, m | 0 | 2 | curved |
+    | 8 | time to go, s | 0 | 1 | curved |
+    | 9, 10 | current target east, north of the first one, m | 0 | 100 | |
+    | 11 | current target above the first one, m: always 0 | 0 | 100 | |
+    | 12-43 | latent of the safety map, about normal over random rollouts | 0 | 1 | |
+
+    Bounds are -8 to 8, for height and width -1 to 8. `layout="relative"` has the same elements without
+    curves, on the scales in `rl.encoding`; `layout="printed"` has elements 0-11 as the paper prints them:
+    position, velocity, mass, width twice, target. Rewards, actions and options: `LandingEnv`.
     """
 
     def __init__(
@@ -215,7 +215,7 @@ class LunarHDAEnv(LandingEnv[NDArray[np.float32]]):
         dispersions: Dispersions | None = None,
         action_ranges: ActionRanges = PAPER_ACTIONS,
         render_mode: str | None = None,
-        layout: str = RELATIVE.name,
+        layout: str = CURVED.name,
     ) -> None:
         """Make the environment; the shipped map encoder is loaded.
 
@@ -266,13 +266,13 @@ class LunarHDAMapEnv(LandingEnv[dict[str, Any]]):
         super().__init__(preset, split, dispersions, action_ranges, render_mode)
         pixels = find_preset(preset).lidar.pixels
         self.observation_space = spaces.Dict(
-            flight=spaces.Box(RELATIVE.low, RELATIVE.high, dtype=np.float32),
+            flight=spaces.Box(CURVED.low, CURVED.high, dtype=np.float32),
             map=spaces.Box(0, 255, (1, pixels, pixels), np.uint8),
         )
 
     def encode(self, observation: Observation, nominal_target: NDArray[np.float64]) -> dict[str, Any]:
         """The flight and the map."""
         return {
-            "flight": encode_flight(RELATIVE, observation, nominal_target),
+            "flight": encode_flight(CURVED, observation, nominal_target),
             "map": np.round(observation.safety_map[None] * 255.0).astype(np.uint8),
         }

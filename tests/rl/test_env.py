@@ -18,7 +18,7 @@ from hda.outcome import score_step
 from hda.presets import PRESETS, sample_scenario
 from rl.action import decide_action
 from rl.dispersions import Dispersions
-from rl.encoding import PRINTED, RELATIVE
+from rl.encoding import CURVED, PRINTED, RELATIVE
 from rl.env import LunarHDAEnv, LunarHDAMapEnv
 
 IDS = ("LunarHDA-v0", "LunarHDA-Map-v0")
@@ -121,7 +121,7 @@ def test_unseeded_environments_differ():
     assert LunarHDAEnv().reset()[1]["study_seed"] != LunarHDAEnv().reset()[1]["study_seed"]
 
 
-@pytest.mark.parametrize("layout", [RELATIVE, PRINTED], ids=lambda layout: layout.name)
+@pytest.mark.parametrize("layout", [CURVED, RELATIVE, PRINTED], ids=lambda layout: layout.name)
 def test_no_element_is_constant_but_the_listed_ones(layout):
     env = LunarHDAEnv(layout=layout.name)
     rng = np.random.default_rng(0)
