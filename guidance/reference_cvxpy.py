@@ -13,7 +13,7 @@ search over the time of flight (golden section on a grid's best cell) share noth
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
@@ -83,6 +83,11 @@ def _model(nodes: int, limits: tuple[bool, bool, bool, bool]) -> tuple[Any, dict
     return cp.Problem(cp.Minimize(-z[-1]), rules), p, {"r": r, "v": v, "u": u, "z": z, "s": s}
 
 
+def forget_models() -> None:
+    """Drop every compiled model; the next call of each kind states and compiles its problem anew."""
+    _model.cache_clear()
+
+
 def _limits(problem: LandingProblem) -> tuple[bool, bool, bool, bool]:
     return (
         problem.lander.min_thrust > 0.0,
@@ -94,12 +99,16 @@ def _limits(problem: LandingProblem) -> tuple[bool, bool, bool, bool]:
 
 @dataclass(frozen=True, eq=False)
 class _Flight:
-    """A fixed-time answer: ln(m / m_start) at the nodes and the trajectory in SI; or bad news."""
+    """A fixed-time answer: ln(m / m_start) at the nodes and the trajectory in SI; or bad news.
+
+    `solves` counts the solves behind it.
+    """
 
     time: float
     status: str
     log_mass: Array
     trajectory: dict[str, Array]
+    solves: int = 1
 
     @property
     def share(self) -> float:
@@ -146,11 +155,11 @@ def _solve_time(problem: LandingProblem, nodes: int, time: float) -> _Flight:
     """Linearise about the last answer until it no longer moves."""
     reference = np.linspace(0.0, -0.5 * problem.log_mass_ratio, nodes)
     flight = _solve_once(problem, nodes, time, reference)
-    for _ in range(_LINEARISATIONS):
+    for solves in range(1, _LINEARISATIONS + 1):
         if not flight.log_mass.size or float(np.max((flight.log_mass - reference) ** 2)) < 2e-4:
             break
         reference = flight.log_mass
-        flight = _solve_once(problem, nodes, time, reference)
+        flight = replace(_solve_once(problem, nodes, time, reference), solves=solves + 1)
     return flight
 
 
@@ -158,25 +167,29 @@ def _solve_best_time(problem: LandingProblem, nodes: int) -> _Flight:
     """Golden section between the neighbours of the best time on a grid."""
     window = time_window(problem)
     if window.empty:
-        return _Flight(math.nan, window.cause, np.empty(0), {})
+        return _Flight(math.nan, window.cause, np.empty(0), {}, solves=0)
     grid = window.grid()
     flights = [_solve_time(problem, nodes, float(time)) for time in grid]
+    solves = sum(flight.solves for flight in flights)
     at = int(np.argmin([flight.share for flight in flights]))
     best = flights[at]
     if not best.log_mass.size:
-        return best
+        return replace(best, solves=solves)
     low, high = float(grid[max(at - 1, 0)]), float(grid[min(at + 1, grid.size - 1)])
     a = _solve_time(problem, nodes, high - _GOLDEN * (high - low))
     b = _solve_time(problem, nodes, low + _GOLDEN * (high - low))
+    solves += a.solves + b.solves
     while high - low > _TIME_TOLERANCE * high:
         if a.share < b.share or (math.isinf(a.share) and math.isinf(b.share) and best.time < b.time):
             high, b = b.time, a
             a = _solve_time(problem, nodes, high - _GOLDEN * (high - low))
+            solves += a.solves
         else:
             low, a = a.time, b
             b = _solve_time(problem, nodes, low + _GOLDEN * (high - low))
+            solves += b.solves
         best = min(best, a, b, key=lambda flight: flight.share)
-    return best
+    return replace(best, solves=solves)
 
 
 def plan_cvxpy(problem: LandingProblem, nodes: int, time_of_flight: float | None = None) -> Plan:
@@ -199,12 +212,12 @@ def plan_cvxpy(problem: LandingProblem, nodes: int, time_of_flight: float | None
         least = float(np.linalg.norm(trajectory["thrust"], axis=1).min())
         if least < (1.0 - 1e-3) * problem.lander.min_thrust:
             message = "the relaxed optimum thrusts below min_thrust"
-            return Plan(PlanStatus.LIMIT_REACHED, problem, METHOD, message=message)
-        return Plan.of_flight(PlanStatus.OPTIMAL, problem, METHOD, trajectory)
+            return Plan(PlanStatus.LIMIT_REACHED, problem, METHOD, message=message, solves=flight.solves)
+        return Plan.of_flight(PlanStatus.OPTIMAL, problem, METHOD, trajectory, flight.solves)
     if flight.log_mass.size:
         needed = problem.state.mass * -math.expm1(-flight.share)
         message = f"propellant: the cheapest flight found needs {needed:.2f} kg"
-        return Plan(PlanStatus.INFEASIBLE, problem, METHOD, message=message)
+        return Plan(PlanStatus.INFEASIBLE, problem, METHOD, message=message, solves=flight.solves)
     failed = "Error" in flight.status or "Panic" in flight.status
     status = PlanStatus.SOLVER_FAILED if failed else PlanStatus.INFEASIBLE
-    return Plan(status, problem, METHOD, message=flight.status)
+    return Plan(status, problem, METHOD, message=flight.status, solves=flight.solves)

@@ -155,7 +155,7 @@ def _forget_cvxpy_model() -> None:
     """Drop the compiled models, so that the next call states and compiles its problem anew."""
     from guidance import reference_cvxpy
 
-    reference_cvxpy._model.cache_clear()
+    reference_cvxpy.forget_models()
 
 
 def timed_methods() -> list[Method]:

@@ -5,6 +5,8 @@ import sys
 
 import pytest
 
+import guidance
+
 RUN = "import sys, guidance; {code}; print(*sorted(m for m in sys.modules), sep='\\n')"
 
 
@@ -44,3 +46,16 @@ def test_cvxpy_model_is_disciplined_parametrised():
 
     problem, _, _ = _model(11, (True, True, True, True))
     assert problem.is_dcp(dpp=True)
+
+
+def test_references_count_their_solves_and_forget_on_demand():
+    from guidance import reference_cvxpy
+
+    start, target = [180.0, 120.0, 940.0, -7.0, -4.0, -28.0, 1200.0], [0.0, 0.0, 50.0]
+    fixed = guidance.solve_pdg(start, target, method="cvxpy", nodes=15, time_of_flight=29.0)
+    free = guidance.solve_pdg(start, target, method="cvxpy", nodes=15)
+    assert 1 <= fixed.solves <= 7
+    assert free.solves > 10
+    assert guidance.solve_pdg(start, target, method="casadi", nodes=15).solves == 1
+    reference_cvxpy.forget_models()
+    assert reference_cvxpy._model.cache_info().currsize == 0
