@@ -21,6 +21,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from guidance.validation import finite_number
 from hda.presets import find_preset
 from hda.registry import policy_entry, policy_names
+from studies.contract import check_contract
 from studies.monte_carlo import (
     Study,
     StudyResult,
@@ -53,7 +54,8 @@ class Comparison:
 
     Attributes:
         episodes: episodes per policy, at least 1.
-        policies: names of policies; `default` is every one that is not slow, `all` is every one.
+        policies: names of policies; `default` is every one that is not slow, `all` is every one;
+            `package.module:Name` is a policy of your own, checked against the contract first.
         preset: the setting: paper or hard.
         study_seed: seed of the study; equal seeds give equal episodes.csv and table.csv.
         split: tile split: validation or fresh to evaluate, tuning for choices.
@@ -87,20 +89,19 @@ def plan_study(options: Comparison) -> Study:
     for name in ("episodes", "workers"):
         finite_number(name, getattr(options, name), at_least=1)
     finite_number("study_seed", options.study_seed, at_least=0)
+    policies, paths = choose_policies(options.policies)
     return Study(
-        find_preset(options.preset),
-        choose_policies(options.policies),
-        options.episodes,
-        options.study_seed,
-        options.split,
+        find_preset(options.preset), policies, options.episodes, options.study_seed, options.split, paths
     )
 
 
-def choose_policies(wanted: Sequence[str]) -> tuple[str, ...]:
-    """Registered names in the order of the registry, each once; `default` and `all` stand for several.
+def choose_policies(wanted: Sequence[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Names in the order of the registry, each once, and the paths among what was asked for.
+
+    `default` and `all` stand for several names; a path `package.module:Name` is loaded and gives a name.
 
     Raises:
-        ValueError: a name is unknown, or none was given.
+        ValueError: a name is unknown, a path leads to no policy, or none was given.
     """
     if not wanted:
         raise ValueError("policies must name at least one policy")
@@ -108,10 +109,9 @@ def choose_policies(wanted: Sequence[str]) -> tuple[str, ...]:
         "all": policy_names(),
         "default": tuple(name for name in policy_names() if not policy_entry(name).slow),
     }
-    chosen = {name for entry in wanted for name in groups.get(entry, (entry,))}
-    for name in sorted(chosen):
-        policy_entry(name)
-    return tuple(name for name in policy_names() if name in chosen)
+    chosen = {name for entry in wanted for name in groups.get(entry) or (policy_entry(entry).name,)}
+    paths = tuple(dict.fromkeys(entry for entry in wanted if ":" in entry))
+    return tuple(name for name in policy_names() if name in chosen), paths
 
 
 def choose_existing(options: Comparison) -> Existing:
@@ -208,6 +208,8 @@ def compare(options: Comparison) -> list[PolicySummary]:
     """
     study = plan_study(options)
     existing = choose_existing(options)
+    for path in study.paths:
+        check_contract(policy_entry(path).make, study.preset)
     out = open_folder(options.out or Path("results") / study.preset.name)
     with open_study_folder(out, with_reference(study), existing) as folder:
         flown = fly_with_progress(folder, options.workers)

@@ -10,7 +10,6 @@ import numpy as np
 
 from hda.episode import EpisodeRecord, fly
 from hda.presets import sample_scenario
-from hda.registry import make_policy
 from studies.monte_carlo import Study
 from studies.rows import EpisodeRow
 
@@ -37,7 +36,7 @@ def draw_figures(out: Path, study: Study, rows: Sequence[EpisodeRow]) -> None:
     draw_histograms(figures / "histograms.png", study, rows)
     scenario = sample_scenario(study.preset, study.study_seed, choose_episode(rows), study.split)
     for name in study.policies:
-        record = fly(make_policy(name), scenario)
+        record = fly(study.make_policy(name), scenario)
         stem = f"{name}-{scenario.streams.episode:06d}"
         draw_flight(figures / f"trajectory-{stem}.png", record)
         save_flight(trajectories / f"{stem}.npz", record)

@@ -15,7 +15,6 @@ from numpy.typing import ArrayLike, NDArray
 from hda.episode import EpisodeRecord, fly
 from hda.policy import ZemZevCommand
 from hda.presets import sample_scenario
-from hda.registry import make_policy
 from hda.tile import Tile
 from studies.figures import choose_episode, save_flight
 from studies.monte_carlo import Study
@@ -109,7 +108,9 @@ def fly_pictures(
 
 def picture_flight(study: Study, policy: str, episode: int, folder: Path) -> FlightPicture:
     """Fly one episode again, save it, and reduce it."""
-    record = fly(make_policy(policy), sample_scenario(study.preset, study.study_seed, episode, study.split))
+    record = fly(
+        study.make_policy(policy), sample_scenario(study.preset, study.study_seed, episode, study.split)
+    )
     save_flight(folder / f"{record.policy}-{episode:06d}.npz", record)
     return reduce_flight(record)
 

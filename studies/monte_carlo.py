@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from hda.dtm_library import Ground, prepare_tiles
 from hda.episode import fly
 from hda.presets import sample_scenario
-from hda.registry import make_policy
+from hda.registry import AnyPolicy, make_policy, policy_entry
 from hda.scenario import Preset
 from studies.rows import EpisodeRow, summarize_episode
 
@@ -52,6 +52,7 @@ class Study:
         episodes: episodes 0 to episodes - 1 are flown.
         study_seed: seed of the study.
         split: tile split.
+        paths: paths `package.module:Name` of policies that are not registered; `policies` holds their names.
     """
 
     preset: Preset
@@ -59,6 +60,13 @@ class Study:
     episodes: int
     study_seed: int = 0
     split: str = "validation"
+    paths: tuple[str, ...] = ()
+
+    def make_policy(self, name: str) -> AnyPolicy:
+        """Make one of the study's policies, in any process."""
+        for path in self.paths:
+            policy_entry(path)
+        return make_policy(name)
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +113,7 @@ def fly_chunk(study: Study, first: int, last: int) -> Chunk:
     Raises:
         PolicyError: a policy raised something.
     """
-    pilots = {name: make_policy(name) for name in study.policies}
+    pilots = {name: study.make_policy(name) for name in study.policies}
     rows: dict[str, list[EpisodeRow]] = {name: [] for name in pilots}
     times: dict[str, list[NDArray[np.float64]]] = {name: [] for name in pilots}
     for episode in range(first, last):

@@ -56,6 +56,7 @@ def identify_study(study: Study) -> dict[str, Any]:
             "policies": list(study.policies),
             "study_seed": study.study_seed,
             "split": study.split,
+            "paths": list(study.paths),
             "chunk_episodes": CHUNK_EPISODES,
         },
         "preset": asdict(study.preset),
@@ -73,9 +74,9 @@ def digest_sources(study: Study) -> dict[str, str]:
     root = Path(__file__).resolve().parent
     digests = {name: _digest(root.parent / name) for name in ("guidance", "hda", "rl")}
     digests["studies"] = _digest(root / "monte_carlo.py", root / "rows.py")
-    for policy in study.policies:
-        module, colon, _ = policy.partition(":")
-        found = importlib.util.find_spec(module) if colon else None
+    for path in study.paths:
+        module = path.partition(":")[0]
+        found = importlib.util.find_spec(module)
         if found is not None and found.origin is not None:
             digests[module] = _digest(Path(found.origin))
     return digests
