@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from guidance import condensed, constraints
+from guidance import constraints
 from guidance.clarabel_solver import ConicAnswer, ConicSolver, SolveStatus
-from guidance.condensed import CondensedLayout
+from guidance.condensed import CondensedLayout, burnt_mass, expand, landing_moments
 from guidance.constraints import Rows
 from guidance.layout import Layout
 from guidance.problem import LandingProblem
@@ -27,6 +27,10 @@ from guidance.state import State
 
 Array = NDArray[np.float64]
 Family = Callable[[Any, ScaledProblem], Rows]  # a Layout or a CondensedLayout
+
+_CONSTANT_FAMILIES: frozenset[Family] = frozenset(
+    {burnt_mass, constraints.landing, constraints.altitude_floor, constraints.thrust_cone}
+)
 
 
 @dataclass(frozen=True)
@@ -91,8 +95,8 @@ class ConstraintSet:
     def condensed_families(self) -> list[Family]:
         """Constraint functions of the problem without its states, in row order."""
         chosen: list[tuple[bool, Family]] = [
-            (True, condensed.burnt_mass),
-            (True, condensed.landing_moments),
+            (True, burnt_mass),
+            (True, landing_moments),
             (True, constraints.max_thrust),
             (self.min_thrust, constraints.min_thrust),
             (self.pointing, constraints.pointing),
@@ -185,11 +189,11 @@ class ConvexTemplate:
         self._constant: dict[Family, Rows] = {}
         nominal = _nominal_numbers(constraint_set.nodes)
         rows = self.rows(nominal)
-        fixed: list[Family] = [constraints.landing, constraints.altitude_floor, constraints.thrust_cone]
-        for family in fixed:
-            if family in self._families:
-                self._constant[family] = family(self.layout, nominal)
+        for family in _CONSTANT_FAMILIES.intersection(self._families):
+            self._constant[family] = family(self.layout, nominal)
         first = np.cumsum([0] + [part.bound.size for part in rows])
+        moves = [(bool(part.value_power.any()), bool(part.bound_rate.any())) for part in rows]
+        self._timed = [(k, int(first[k]), *move) for k, move in enumerate(moves) if any(move)]
         self._row = np.concatenate([part.row + offset for part, offset in zip(rows, first, strict=False)])
         self._column = np.concatenate([part.column for part in rows])
         self._order = np.lexsort((self._row, self._column))
@@ -236,20 +240,20 @@ class ConvexTemplate:
         sensitivity = self._sensitivity(rows, answer)
         slope = unit * (power * value + sensitivity) / scaled.time
         if self._condensed is not None:
-            answer = replace(answer, primal=condensed.expand(self._condensed, scaled, answer.primal))
+            answer = replace(answer, primal=expand(self._condensed, scaled, answer.primal))
         return ConvexSolution(answer, self._whole, scaled, rows, unit * value, slope)
 
     def _sensitivity(self, rows: list[Rows], answer: ConicAnswer) -> float:
         """T d(optimum)/dT at fixed units: dual' (T dA/dT x - T db/dT), each number being a power of T."""
-        total, first = 0.0, 0
-        for part in rows:
+        total = 0.0
+        for index, first, value_moves, bound_moves in self._timed:
+            part = rows[index]
             dual = answer.dual[first : first + part.bound.size]
-            first += part.bound.size
-            if part.value_power.any():
+            if value_moves:
                 weight = part.value_power * part.value * answer.primal[part.column]
                 total += float(dual[part.row] @ weight)
-            if part.bound_rate.any():
-                total -= float(np.sum(dual * part.bound_rate))
+            if bound_moves:
+                total -= float((dual * part.bound_rate).sum())
         return total
 
 
