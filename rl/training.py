@@ -189,7 +189,15 @@ def run_training(
         ValueError: the folder holds a run and `resume` is not set, or holds a run with other settings.
     """
     torch.set_num_threads(1)
+    precision = torch.get_float32_matmul_precision()
     torch.set_float32_matmul_precision(settings.matmul_precision)
+    try:
+        _train(folder, preset, settings, plan, resume)
+    finally:
+        torch.set_float32_matmul_precision(precision)
+
+
+def _train(folder: Path, preset: Preset, settings: AgentSettings, plan: TrainingPlan, resume: bool) -> None:
     checkpoint = _open_folder(folder, preset, settings, plan, resume)
     env = LunarHDAEnv(preset, layout=settings.layout, action_ranges=settings.action_ranges)
     algorithm = make_algorithm(settings, env, plan.seed)
