@@ -54,7 +54,7 @@ def test_unseen_ground_is_safe_as_often_as_inferred(preset):
             window = safe[corner[0] : corner[0] + 240, corner[1] : corner[1] + 240]
             cells = np.floor(120.0 + ((np.arange(64) + 0.5) / 64 - 0.5) * width).astype(int)
             seen = np.zeros(window.shape, dtype=np.bool_)
-            seen[np.ix_(cells, cells)] = True
+            seen[cells[:, None], cells] = True
             share = infer_unseen(np.where(seen, window, 0.1).astype(np.float32), seen)
             np.testing.assert_array_equal(share[seen], window[seen])
             inferred.append(share[~seen])
