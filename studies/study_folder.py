@@ -10,7 +10,6 @@ from __future__ import annotations
 import json
 import os
 import platform
-import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -33,7 +32,14 @@ _PRODUCTS = (
     "table.md",
     "timings.csv",
 )
-_PRODUCT_FOLDERS = ("figures", "shards", "trajectories")
+_PRODUCT_PATTERNS = (
+    "figures/histograms.png",
+    "figures/trajectory-*.png",
+    "shards/study.json",
+    "shards/episodes-*.jsonl",
+    "shards/.*.jsonl.*",
+    "trajectories/*.npz",
+)
 
 
 class FolderError(ValueError):
@@ -130,7 +136,7 @@ def open_study_folder(path: Path, study: Study, existing: Existing) -> Iterator[
             )
         if begun and existing is Existing.RESUME:
             _check_same_study(held, identity)
-        else:
+        elif begun:
             _remove_products(path)
         held.parent.mkdir(exist_ok=True)
         for draft in held.parent.glob(".*.jsonl.*"):
@@ -200,5 +206,6 @@ def _remove_products(path: Path) -> None:
     """Remove what an earlier study left, and nothing else."""
     for name in _PRODUCTS:
         (path / name).unlink(missing_ok=True)
-    for name in _PRODUCT_FOLDERS:
-        shutil.rmtree(path / name, ignore_errors=True)
+    for pattern in _PRODUCT_PATTERNS:
+        for product in path.glob(pattern):
+            product.unlink()

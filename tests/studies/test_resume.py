@@ -159,8 +159,12 @@ def test_a_damaged_identity_is_refused(tmp_path: Path, content: str) -> None:
 
 
 def test_a_study_is_not_overwritten_unless_asked(tmp_path: Path) -> None:
-    kept = tmp_path / "notes.txt"
-    kept.write_text("mine")
+    kept = [
+        tmp_path / name for name in ("notes.txt", "figures/mine.png", "shards/mine", "trajectories/a.csv")
+    ]
+    for path in kept:
+        path.parent.mkdir(exist_ok=True)
+        path.write_text("mine")
     compare(options(tmp_path, episodes=10))
     before = contents(tmp_path)
     with pytest.raises(FolderError, match=r"--resume.*--overwrite"):
@@ -171,7 +175,7 @@ def test_a_study_is_not_overwritten_unless_asked(tmp_path: Path) -> None:
     compare(options(tmp_path, episodes=12, overwrite=True))
     assert contents(tmp_path) != before
     assert len(list(tmp_path.glob("shards/*.jsonl"))) == 2
-    assert kept.read_text() == "mine"
+    assert all(path.read_text() == "mine" for path in kept)
 
 
 def test_tables_without_shards_are_a_study_too(tmp_path: Path) -> None:
