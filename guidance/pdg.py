@@ -58,7 +58,8 @@ def solve_pdg(
             reading) or 'casadi' (the unrelaxed nonconvex problem by IPOPT).
         unreachable: what to do where the target is out of reach: 'raise', or plan to the softly reachable
             point 'nearest' to it in its plane (always by the convex method).
-        guess: an earlier Plan of nearly the same flight: what is left of it seeds the search.
+        guess: an earlier Plan of nearly the same flight: what is left of it seeds the search where the
+            indirect method finds no flight within the limits.
         throw: raise where there is no flight; otherwise return a Plan that says why.
 
     Returns:
@@ -133,7 +134,8 @@ def _plan(
 
         convex = plan_convex(problem, nodes, time_of_flight)
         if convex.status.has_flight:  # the case is feasible: the local solver had a poor start
-            return plan_casadi(problem, nodes, time_of_flight, convex)
+            again = plan_casadi(problem, nodes, time_of_flight, convex)
+            return replace(again, solves=plan.solves + convex.solves + again.solves)
     return plan
 
 
@@ -144,6 +146,7 @@ def _without_flight(plan: Plan, nodes: int, time_of_flight: float | None, unreac
     problem, anywhere = plan.problem, False
     if unreachable == "nearest":
         nearest = plan_nearest(problem, nodes, time_of_flight)
+        nearest = replace(nearest, solves=plan.solves + nearest.solves)
         if nearest.status.has_flight:
             return nearest
         anywhere = nearest.status is PlanStatus.INFEASIBLE
@@ -158,7 +161,7 @@ def _without_flight(plan: Plan, nodes: int, time_of_flight: float | None, unreac
     if plan.method == "convex" and proof is not None and time_of_flight is None and not anywhere:
         retry = plan_convex(problem, nodes, None, proof.time)
         if retry.status.has_flight:
-            return retry
+            return replace(retry, solves=plan.solves + retry.solves)
     if plan.status is PlanStatus.INFEASIBLE:
         message = f"{plan.message}; infeasibility could not be proved"
         return replace(plan, status=PlanStatus.LIMIT_REACHED, message=message)

@@ -3,6 +3,7 @@
 import math
 import statistics
 import time
+from typing import Any
 
 import numpy as np
 import pytest
@@ -296,6 +297,27 @@ def test_no_soft_landing_anywhere_is_infeasible_even_for_nearest():
         guidance.solve_pdg([0, 0, 110, 0, 0, -60, 1200], TARGET, unreachable="nearest")
 
 
+def test_every_solve_is_counted():
+    """All calls of the conic solver but those of proofs, whatever the way to the plan."""
+    rng, before = np.random.default_rng(9), ConicSolver.solve
+    starts = [paper_start(rng) for _ in range(5)] + [harsh_start(rng) for _ in range(15)]
+    choices: list[dict[str, Any]] = [{}, {"lander": Lander(pointing_limit=0.4)}, {"speed_limit": 60.0}]
+    for start in starts:
+        for options in choices:
+            guidance.solve_pdg(start, TARGET, throw=False, **options)  # builds the solvers
+            calls = []
+
+            def count(*numbers, calls=calls):
+                calls.append(1)
+                return before(*numbers)
+
+            with pytest.MonkeyPatch.context() as patch:
+                patch.setattr(ConicSolver, "solve", count)
+                plan = guidance.solve_pdg(start, TARGET, throw=False, **options)
+            if plan.status is PlanStatus.OPTIMAL:
+                assert plan.solves <= len(calls) <= 2 * plan.solves  # the altitude floor may need a second
+
+
 def test_replanning_from_a_guess():
     """On the way, undisturbed: the rest of the plan is the optimum (Bellman), found in fewer solves."""
     plan = guidance.solve_pdg(START, TARGET)
@@ -318,15 +340,15 @@ def test_guess_without_a_flight_is_ignored():
     assert plan.thrust.tobytes() == guidance.solve_pdg(START, TARGET).thrust.tobytes()
 
 
-def test_free_time_costs_at_most_four_fixed_time_solves():
+def test_free_time_costs_at_most_two_fixed_time_solves():
     rng = np.random.default_rng(8)
     starts = [paper_start(rng) for _ in range(15)]
     ratios = []
     for start in [starts[0], *starts]:  # the first builds the solvers
-        clock = time.perf_counter()
+        clock = time.process_time()
         plan = guidance.solve_pdg(start, TARGET)
-        free = time.perf_counter() - clock
-        clock = time.perf_counter()
+        free = time.process_time() - clock
+        clock = time.process_time()
         guidance.solve_pdg(start, TARGET, time_of_flight=plan.time_of_flight)
-        ratios.append(free / (time.perf_counter() - clock))
-    assert statistics.median(ratios[1:]) < 4.0
+        ratios.append(free / (time.process_time() - clock))
+    assert statistics.median(ratios[1:]) < 2.0
