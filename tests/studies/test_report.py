@@ -384,8 +384,7 @@ def test_the_tables_need_no_javascript(study: Path, page_address: str) -> None:
 
 @pytest.mark.slow
 def test_a_thousand_episodes_stay_under_15_megabytes(tmp_path: Path) -> None:
-    quick = ("no-divert", "single-divert", "nearest-safe", "oracle", "single-divert+convex")
-    options = Comparison(episodes=1000, policies=quick, out=tmp_path / "study", figures=False)
+    options = Comparison(episodes=1000, policies=POLICIES, out=tmp_path / "study", figures=False)
     compare(options)
     assert (tmp_path / "study" / "report.html").stat().st_size < 15e6
     rebuilt = (tmp_path / "study" / "report.html").read_text()
