@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from guidance.soft_landing import SoftLandingOptions
+from hda.policies.adjusted_descent import AdjustedDescent
 from hda.policies.composition import ComposedPolicy, PrivilegedComposition
+from hda.policies.hazard_aware import HazardAwareSite
+from hda.policies.oracle_fuel import CheapestSafeSite
 from hda.policies.planned_descent import PlannedDescent
 from hda.policies.zem_zev import FixedGainZemZev
 from hda.registry import PolicyEntry
@@ -53,6 +56,22 @@ ENTRIES: tuple[PolicyEntry, ...] = (
         "oracle+convex",
         lambda: PrivilegedComposition("oracle+convex", OracleSite, PlannedDescent()),
         "the sites of oracle, flown by convex guidance",
+        privileged=True,
+    ),
+    PolicyEntry(
+        "hazard-aware",
+        lambda: ComposedPolicy("hazard-aware", HazardAwareSite(), AdjustedDescent()),
+        "least propellant and risk by the belief from all looks, flown by convex guidance",
+    ),
+    PolicyEntry(
+        "hazard-aware+zem-zev",
+        lambda: ComposedPolicy("hazard-aware+zem-zev", HazardAwareSite(), FixedGainZemZev()),
+        "the sites of hazard-aware's objective, flown by ZEM/ZEV",
+    ),
+    PolicyEntry(
+        "oracle-fuel",
+        lambda: PrivilegedComposition("oracle-fuel", CheapestSafeSite, PlannedDescent()),
+        "knows the true map: the cheapest truly safe ground with 2 m of clearance, by convex guidance",
         privileged=True,
     ),
 )

@@ -1,0 +1,65 @@
+"""Planned descent that meets a late change of site by deforming the plan in flight."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from guidance.retarget import shift_landing_point, velocity_change, within_thrust
+from guidance.tracking import TrackingReference, tracking_gains
+from hda.observation import Observation, ScenarioView
+from hda.policies.planned_descent import DescentMemory, PlannedDescent
+from hda.policy import Command, DecisionStatus, PlanCommand
+
+
+@dataclass(frozen=True)
+class AdjustedDescent:
+    """As `PlannedDescent`, but a new site may also be reached by a sideways shift of the plan in flight.
+
+    Early, the cheaper of the shifted and the fresh plan flies; late, the shifted one wherever it keeps within
+    the thrust.
+
+    Attributes:
+        planned: makes and tracks fresh plans.
+        adjust_time: [s] with less time left than this no fresh plan is asked for if the shift will do.
+        reserve: share of the thrust that a shifted plan leaves to the feedback.
+    """
+
+    planned: PlannedDescent = field(default_factory=PlannedDescent)
+    adjust_time: float = 11.0
+    reserve: float = 0.05
+
+    def begin(self, view: ScenarioView) -> DescentMemory:
+        """No plan yet."""
+        return self.planned.begin(view)
+
+    def command(
+        self, observation: Observation, site: NDArray[np.float64], memory: DescentMemory
+    ) -> tuple[Command, DecisionStatus, DescentMemory]:
+        """Shift the plan in flight, replan, or fly on."""
+        left, view = memory.reference, memory.view
+        if left is None or memory.site is None or np.array_equal(site, memory.site):
+            return self.planned.command(observation, site, memory)
+        shifted = shift_landing_point(left, site, view.gravity)
+        possible = within_thrust(shifted, view.lander, observation.state.mass, self.reserve)
+        if not possible or left.duration > self.adjust_time:
+            fresh = self.planned.command(observation, site, memory)
+            if not possible or _is_cheaper(fresh[:2], shifted):
+                return fresh
+        periods = round(view.decision_interval / view.control_period)
+        command = PlanCommand(shifted, tracking_gains(view.control_period, self.planned.weights))
+        return (
+            command,
+            DecisionStatus.NOMINAL,
+            replace(memory, site=site.copy(), reference=shifted.after(periods)),
+        )
+
+
+def _is_cheaper(fresh: tuple[Command, DecisionStatus], shifted: TrackingReference) -> bool:
+    """Whether a fresh plan reached its site, and costs no more than the shifted one."""
+    command, status = fresh
+    if not isinstance(command, PlanCommand) or status is not DecisionStatus.NOMINAL:
+        return False
+    return velocity_change(command.reference) <= velocity_change(shifted)
