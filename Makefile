@@ -32,7 +32,7 @@ test-all: lint  ## lint, then every test
 	$(BIN)/pytest -n 2 $(ARGS)
 
 compare: $(VENV)/.installed  ## fly every policy on the same episodes and print the table
-	$(BIN)/python -m studies.compare $(ARGS)
+	$(BIN)/python -m studies.compare --resume $(ARGS)
 
 bench: $(VENV)/.installed  ## measure the speed of the inner loops
 	$(BIN)/python -m studies.bench $(ARGS)
