@@ -158,10 +158,12 @@ def test_a_kept_tile_is_mapped_read_only_and_equal_to_the_built_one():
 
 
 def test_a_kept_tile_is_not_built_again(monkeypatch):
-    load_tile(SMALL, 0, "train")
+    built = load_tile(SMALL, 0, "train")
     forget()
     monkeypatch.setattr(dtm_library, "build_tile", pytest.fail)
-    load_tile(SMALL, 0, "train")
+    kept = load_tile(SMALL, 0, "train")
+    assert kept is not built
+    np.testing.assert_array_equal(kept.elevation, built.elevation)
 
 
 def test_files_hold_no_pickle_and_nothing_temporary_remains():
