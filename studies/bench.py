@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import dataclass
 from time import perf_counter
 
@@ -17,6 +16,7 @@ from hda.policy import PrivilegedPolicy
 from hda.presets import sample_scenario
 from hda.registry import make_policy
 from hda.terrain_timing import measure_terrain
+from studies.command_line import one_line_errors
 
 
 @dataclass(frozen=True)
@@ -88,11 +88,8 @@ def bench(options: Bench) -> None:
 def main() -> None:
     """Command line; a wrong option is one line on stderr and exit code 2."""
     options = tyro.cli(Bench, description=__doc__)
-    try:
+    with one_line_errors():
         bench(options)
-    except ValueError as error:
-        Console(stderr=True).print(f"error: {error}", style="red", markup=False, highlight=False)
-        sys.exit(2)
 
 
 if __name__ == "__main__":

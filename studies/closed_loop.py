@@ -7,7 +7,6 @@ length of the gentle terminal phase, a limit on speed. The same sites, the same 
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
@@ -29,6 +28,7 @@ from hda.policies.zem_zev import FixedGainZemZev
 from hda.presets import find_preset, sample_scenario
 from hda.scenario import Preset
 from hda.site_selection import NearestSafeSite, SingleDivertSite, SiteSelection
+from studies.command_line import one_line_errors
 from studies.monte_carlo import CHUNK_EPISODES, Study, local_processes, prepare_study
 from studies.rows import EpisodeRow, summarize_episode
 from studies.statistics import wilson_interval
@@ -140,11 +140,8 @@ def sweep(options: Sweep) -> dict[str, list[str]]:
 def main() -> None:
     """Command line; a wrong option is one line on stderr and exit code 2."""
     options = tyro.cli(Sweep, description=__doc__)
-    try:
+    with one_line_errors():
         sweep(options)
-    except (ValueError, OSError) as error:
-        Console(stderr=True).print(f"error: {error}", style="red", markup=False, highlight=False)
-        sys.exit(2)
 
 
 if __name__ == "__main__":

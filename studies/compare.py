@@ -21,6 +21,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from guidance.validation import finite_number
 from hda.presets import find_preset
 from hda.registry import policy_entry, policy_names
+from studies.command_line import one_line_errors
 from studies.contract import check_contract
 from studies.monte_carlo import (
     Study,
@@ -261,13 +262,11 @@ def main() -> None:
     """Command line; a wrong option is one line on stderr and exit code 2."""
     options = tyro.cli(Comparison, description=__doc__)
     try:
-        compare(options)
+        with one_line_errors():
+            compare(options)
     except KeyboardInterrupt:
         Console(stderr=True).print("stopped; finished episodes are kept, --resume goes on", style="yellow")
         sys.exit(130)
-    except (ValueError, OSError) as error:
-        Console(stderr=True).print(f"error: {error}", style="red", markup=False, highlight=False)
-        sys.exit(2)
 
 
 if __name__ == "__main__":

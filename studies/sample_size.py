@@ -9,7 +9,6 @@ many tiles.
 from __future__ import annotations
 
 import math
-import sys
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +17,7 @@ from rich.console import Console
 from rich.table import Table
 
 from guidance.validation import finite_number
+from studies.command_line import one_line_errors
 from studies.reliability import needed_episodes
 
 _MOST_EPISODES = 50_000_000
@@ -151,11 +151,8 @@ def plan_demonstration() -> Table:
 def main() -> None:
     """Command line; a wrong option is one line on stderr and exit code 2."""
     options = tyro.cli(SampleSize, description=__doc__)
-    try:
+    with one_line_errors():
         tables = (plan_comparison(options), plan_demonstration())
-    except ValueError as error:
-        Console(stderr=True).print(f"error: {error}", style="red", markup=False, highlight=False)
-        sys.exit(2)
     for table in tables:
         Console().print(table)
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import csv
 import math
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -23,6 +22,7 @@ from rich.table import Table
 from guidance.validation import finite_number
 from hda.presets import find_preset
 from hda.scenario import Preset
+from studies.command_line import one_line_errors
 from studies.compare import open_folder
 from studies.stability_report import conclude
 from studies.stability_sweep import GainRow, MarginRow, Requirement, gain_box, gain_row, margin_row
@@ -139,11 +139,8 @@ def study_stability(options: Stability) -> tuple[list[MarginRow], list[GainRow]]
 
 def main() -> None:
     """Command line; a wrong option is one line on stderr and exit code 2."""
-    try:
+    with one_line_errors():
         study_stability(tyro.cli(Stability, description=__doc__))
-    except (ValueError, OSError) as error:
-        Console(stderr=True).print(f"error: {error}", style="red", markup=False, highlight=False)
-        sys.exit(2)
 
 
 if __name__ == "__main__":

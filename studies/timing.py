@@ -8,7 +8,6 @@ counted only over plans that, flown in SI, keep every limit.
 from __future__ import annotations
 
 import csv
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +18,7 @@ from rich.console import Console
 from rich.table import Table
 
 from guidance.validation import finite_number
+from studies.command_line import one_line_errors
 from studies.compare import open_folder
 from studies.timing_measures import Call, Summary, conclude, measure_calls, summarize_calls
 from studies.timing_methods import paper_cases, reference_cases, timed_methods
@@ -124,11 +124,8 @@ def study_timing(options: Timing) -> list[Summary]:
 
 def main() -> None:
     """Command line; a wrong option is one line on stderr and exit code 2."""
-    try:
+    with one_line_errors():
         study_timing(tyro.cli(Timing, description=__doc__))
-    except (ValueError, OSError) as error:
-        Console(stderr=True).print(f"error: {error}", style="red", markup=False, highlight=False)
-        sys.exit(2)
 
 
 if __name__ == "__main__":
