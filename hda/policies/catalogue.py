@@ -6,6 +6,7 @@ from guidance.soft_landing import SoftLandingOptions
 from hda.policies.adjusted_descent import AdjustedDescent
 from hda.policies.composition import ComposedPolicy, PrivilegedComposition
 from hda.policies.hazard_aware import HazardAwareSite
+from hda.policies.hindsight import BestKnownSite
 from hda.policies.oracle_fuel import CheapestSafeSite
 from hda.policies.planned_descent import PlannedDescent
 from hda.policies.zem_zev import FixedGainZemZev
@@ -72,6 +73,12 @@ ENTRIES: tuple[PolicyEntry, ...] = (
         "oracle-fuel",
         lambda: PrivilegedComposition("oracle-fuel", CheapestSafeSite, PlannedDescent()),
         "knows the true map: the cheapest truly safe ground with 2 m of clearance, by convex guidance",
+        privileged=True,
+    ),
+    PolicyEntry(
+        "hindsight",
+        lambda: PrivilegedComposition("hindsight", BestKnownSite, PlannedDescent()),
+        "knows the true map: the cheapest truly safe ground that could have been seen, by convex guidance",
         privileged=True,
     ),
 )
