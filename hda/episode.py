@@ -19,7 +19,7 @@ from hda.observation import Observation
 from hda.outcome import Outcome, RewardTerms, classify, score_step
 from hda.policy import Decision, Policy, PrivilegedPolicy
 from hda.scenario import Scenario
-from hda.vehicle import FlightStatus, Segment, fly_interval
+from hda.vehicle import FlightErrors, FlightStatus, Segment, fly_interval
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,8 +28,8 @@ class Flight:
 
     Attributes:
         index: number of the decision to come.
-        state: present state.
-        target: [m] shape (3,), current target.
+        state: present state, the true one.
+        target: [m] shape (3,), current target, in the frame of the estimated position.
         time_to_go: [s] what remains of the commanded time to go.
     """
 
@@ -150,21 +150,43 @@ def begin_flight(scenario: Scenario) -> Flight:
     """Stand at t = 0: first target, and the time to go of the quartic to it."""
     state = scenario.initial_state
     target = scenario.nominal_target
-    return Flight(0, state, target, time_to_go(state, target, scenario.preset.gravity))
+    clock = time_to_go(estimated_state(scenario, state), target, scenario.preset.gravity)
+    return Flight(0, state, target, clock)
+
+
+def estimated_state(scenario: Scenario, state: State) -> State:
+    """The state as the lander estimates it: the true one plus the episode's navigation error."""
+    error = scenario.navigation_error
+    return State(state.position + error[:3], state.velocity + error[3:], state.mass)
+
+
+def ground_point(scenario: Scenario, site: NDArray[np.float64]) -> NDArray[np.float64]:
+    """[m] shape (3,), where a site in the frame of the estimated position really lies on the plane.
+
+    The lander points and places its looks relative to itself, so what it takes to be at `site` is off by the
+    horizontal error of its own position.
+    """
+    error = scenario.navigation_error
+    return site - np.array([error[0], error[1], 0.0])
 
 
 def observe(scenario: Scenario, flight: Flight) -> Observation:
     """Take the look of this instant; its noise depends on the episode and the number of the look only."""
     lidar = scenario.preset.lidar
     position = flight.state.position
-    noise = scenario.streams.look(flight.index, lidar.pixels)
+    aim = ground_point(scenario, flight.target)
+    if lidar.dropout > 0.0 and scenario.streams.map_is_missing(flight.index, lidar.dropout):
+        safety_map = np.zeros((lidar.pixels, lidar.pixels), dtype=np.float32)
+    else:
+        noise = scenario.streams.look(flight.index, lidar.pixels)
+        safety_map = look(lidar, position, aim, scenario.tile.probability, noise)
     return Observation(
         index=flight.index,
         time=flight.index * scenario.preset.rules.decision_interval,
-        state=flight.state,
+        state=estimated_state(scenario, flight.state),
         target=flight.target,
-        safety_map=look(lidar, position, flight.target, scenario.tile.probability, noise),
-        width=lidar.width(position, flight.target),
+        safety_map=safety_map,
+        width=lidar.width(position, aim),
         time_to_go=flight.time_to_go,
     )
 
@@ -181,14 +203,17 @@ def advance(scenario: Scenario, flight: Flight, decision: Decision) -> Step:
     if abs(decision.site[2] - plane) > 1e-6:
         raise ValueError(f"site must lie on the target plane z = {plane:g} m, got z = {decision.site[2]:g} m")
     position = flight.state.position
-    slant = min(elevation_angle(position, flight.target), elevation_angle(position, decision.site))
+    aims = [ground_point(scenario, site) for site in (flight.target, decision.site)]
+    slant = min(elevation_angle(position, aim) for aim in aims)
     segment = fly_interval(
         flight.state,
         decision,
         preset.lander,
         np.array(preset.gravity),
         (rules.control_period, rules.control_periods),
-        scenario.streams.thrust_error(flight.index, rules.thrust_error),
+        FlightErrors(
+            scenario.streams.thrust_error(flight.index, rules.thrust_error), scenario.navigation_error
+        ),
     )
     after = Flight(flight.index + 1, segment.final_state, decision.site, segment.time_to_go)
     landed = segment.status is not FlightStatus.FLYING
@@ -201,7 +226,7 @@ def advance(scenario: Scenario, flight: Flight, decision: Decision) -> Step:
             landed and scenario.tile.is_safe(after.state.position),
             segment.status is FlightStatus.TANK_EMPTY,
         )
-        outcome = classify(initial, after.state, decision.site, ground, (preset.lander, rules))
+        outcome = classify(initial, after.state, aims[1], ground, (preset.lander, rules))
     burnt = (flight.state.mass - after.state.mass) / (initial.mass - preset.lander.dry_mass)
     return Step(after, segment, outcome, truncated, score_step(burnt, outcome), slant)
 

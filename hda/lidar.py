@@ -29,6 +29,7 @@ class Lidar:
         noise_range: [m] range to which `noise` refers.
         off_nadir_limit: [rad] pixels further than this from the lander's vertical read 0 (slant angle under
             70 deg).
+        dropout: probability that a look comes without a map: every pixel reads 0.
     """
 
     field_of_view: float = math.radians(11.4)
@@ -36,6 +37,7 @@ class Lidar:
     noise: float = 0.05
     noise_range: float = 500.0
     off_nadir_limit: float = math.radians(20.0)
+    dropout: float = 0.0
 
     def __post_init__(self) -> None:
         """Refuse a sensor that cannot exist."""
@@ -43,6 +45,7 @@ class Lidar:
         finite_number("noise", self.noise, at_least=0.0)
         finite_number("noise_range", self.noise_range, above=0.0)
         finite_number("off_nadir_limit", self.off_nadir_limit, above=0.0, at_most=math.radians(89.0))
+        finite_number("dropout", self.dropout, at_least=0.0, at_most=1.0)
         if self.pixels < 2:
             raise ValueError(f"pixels must be at least 2, got {self.pixels}")
 

@@ -45,7 +45,7 @@ class Observation:
     Attributes:
         index: number of the decision, from 0.
         time: [s] since the start.
-        state: position, velocity and mass.
+        state: estimated position, velocity and mass.
         target: [m] shape (3,), current target: the centre of the look.
         safety_map: shape (n, n), observed probability of safety, row i grows north, column j east.
         width: [m] side of the square look.

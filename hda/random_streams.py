@@ -55,6 +55,15 @@ class EpisodeStreams:
         """Standard normal noise of look `index`, shape (pixels, pixels)."""
         return self._generator(_SENSOR, index).standard_normal((pixels, pixels), dtype=np.float32)
 
+    def navigation_error(self, position_error: float, velocity_error: float) -> NDArray[np.float64]:
+        """Error of the estimated position [m] and velocity [m/s], shape (6,), one for the whole episode."""
+        draw = self._generator(_SENSOR).standard_normal(6)
+        return draw * np.repeat((position_error, velocity_error), 3)
+
+    def map_is_missing(self, index: int, probability: float) -> bool:
+        """Whether look `index` comes without a map."""
+        return bool(self._generator(_SENSOR, index, 1).random() < probability)
+
     def thrust_error(self, index: int, bound: float) -> float:
         """Relative thrust error of interval `index`, uniform in [-bound, bound]."""
         return float(self._generator(_ACTUATOR, index).uniform(-bound, bound))

@@ -15,6 +15,7 @@ from guidance.state import State
 from guidance.validation import finite_number, finite_vector
 from hda.lidar import Lidar
 from hda.observation import ScenarioView
+from hda.own_terrain import OwnTerrain
 from hda.random_streams import EpisodeStreams
 from hda.safety_map import SafetyCriteria
 from hda.terrain import TerrainParameters
@@ -33,6 +34,11 @@ class Rules:
         max_decisions: an episode still in flight after so many is truncated.
         thrust_error: bound of the relative thrust error, uniform, one draw per decision interval (paper:
             0.05).
+        navigation_position_error: [m] 1 sigma of the error of the estimated position along each axis, one
+            draw for the episode. Looks are taken and placed relative to the lander, so a horizontal error
+            moves the first target and little else; a vertical one ends the flight above or into the ground.
+        navigation_velocity_error: [m/s] 1 sigma of the error of the estimated velocity along each axis, one
+            draw for the episode. ZEM/ZEV turns an error b into (K_R - K_V) / K_V b at touchdown: 2 b at 6/2.
         crash_speed: [m/s] a faster touchdown is a crash.
         soft_speed: [m/s] `success` asks for a touchdown no faster, vertically and horizontally.
 
@@ -44,6 +50,8 @@ class Rules:
     control_period: float = 0.5
     max_decisions: int = 20
     thrust_error: float = 0.05
+    navigation_position_error: float = 0.0
+    navigation_velocity_error: float = 0.0
     crash_speed: float = 5.0
     soft_speed: float = 2.0
 
@@ -52,6 +60,8 @@ class Rules:
         finite_number("decision_interval", self.decision_interval, above=0.0)
         finite_number("control_period", self.control_period, above=0.0, at_most=self.decision_interval)
         finite_number("thrust_error", self.thrust_error, at_least=0.0, at_most=0.9)
+        finite_number("navigation_position_error", self.navigation_position_error, at_least=0.0)
+        finite_number("navigation_velocity_error", self.navigation_velocity_error, at_least=0.0)
         finite_number("crash_speed", self.crash_speed, above=0.0)
         finite_number("soft_speed", self.soft_speed, above=0.0)
         if self.max_decisions < 1:
@@ -136,7 +146,7 @@ class Preset:
 
     Attributes:
         name: name in tables.
-        terrain: generator parameters.
+        terrain: generator parameters, or a user's own terrain.
         criteria: Algorithm 1's limits and lander size.
         start: initial conditions.
         lidar: sensor model.
@@ -149,7 +159,7 @@ class Preset:
     """
 
     name: str
-    terrain: TerrainParameters = field(default_factory=TerrainParameters)
+    terrain: TerrainParameters | OwnTerrain = field(default_factory=TerrainParameters)
     criteria: SafetyCriteria = field(default_factory=SafetyCriteria)
     start: StartConditions = field(default_factory=StartConditions)
     lidar: Lidar = field(default_factory=Lidar)
@@ -186,6 +196,13 @@ class Scenario:
     nominal_target: NDArray[np.float64]
 
     @property
+    def navigation_error(self) -> NDArray[np.float64]:
+        """Estimated minus true position [m] and velocity [m/s], shape (6,)."""
+        rules = self.preset.rules
+        sigmas = rules.navigation_position_error, rules.navigation_velocity_error
+        return self.streams.navigation_error(*sigmas) if any(sigmas) else np.zeros(6)
+
+    @property
     def view(self) -> ScenarioView:
         """What a policy may know of it."""
         return ScenarioView(
@@ -206,16 +223,19 @@ def draw_target(
     """Draw the first target: uniform over the target area, where enough of the ground around is unsafe.
 
     Raises:
-        ValueError: no such place was found on the tile in 10 000 draws.
+        ValueError: no such place was found on the tile in 10 000 draws; the message says what the best was.
     """
-    area = start.target_area
+    area, best = start.target_area, 0.0
     for _ in range(_TARGET_DRAWS):
         target = np.array([area.draw(rng), area.draw(rng), plane])
-        if tile.hazard_share(target, start.hazard_radius) >= start.hazard_share:
+        share = tile.hazard_share(target, start.hazard_radius)
+        if share >= start.hazard_share:
             return target
+        best = max(best, share)
     raise ValueError(
         f"tile {tile.number}: no target with at least {start.hazard_share:.0%} hazard"
-        f" within {start.hazard_radius:g} m found in {_TARGET_DRAWS} draws"
+        f" within {start.hazard_radius:g} m found in {_TARGET_DRAWS} draws (the most was {best:.1%});"
+        " a smaller start.hazard_share allows safer ground"
     )
 
 

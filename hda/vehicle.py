@@ -9,7 +9,7 @@ does.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
 
 import numpy as np
@@ -34,6 +34,20 @@ class FlightStatus(IntEnum):
     """The target plane was crossed."""
     TANK_EMPTY = held_thrust.TANK_EMPTY
     """The tank ran dry above the plane; the vehicle then fell to it."""
+
+
+@dataclass(frozen=True, eq=False)
+class FlightErrors:
+    """What chance does to one interval.
+
+    Attributes:
+        thrust: relative error of the applied thrust.
+        navigation: estimated minus true position [m] and velocity [m/s], shape (6,); the vehicle steers by
+            the estimate.
+    """
+
+    thrust: float = 0.0
+    navigation: NDArray[np.float64] = field(default_factory=lambda: np.zeros(6))
 
 
 _LEAST_TELLING = 0.05  # [m/s^2] commanded acceleration under which the engine's error is not estimated
@@ -71,7 +85,7 @@ def _fly_zem_zev(
     site: NDArray[np.float64],
     gains: tuple[float, float],
     clock: tuple[float, float, float],
-    thrust_error: float,
+    errors: tuple[float, NDArray[np.float64]],
     gravity: NDArray[np.float64],
     vehicle: VehicleNumbers,
     log: _Log,
@@ -79,6 +93,8 @@ def _fly_zem_zev(
     """Fly one interval; `clock` = (time to go, its rate, control period). Returns (nodes written, status)."""
     time, path, commanded = log
     time_to_go, rate, period = clock
+    thrust_error, navigation = errors
+    seen = start.copy()
     periods = commanded.shape[0] - 1
     path[0] = start
     time[0] = 0.0
@@ -90,7 +106,8 @@ def _fly_zem_zev(
             return k + 2, TOUCHDOWN
         if k == periods:
             break
-        zem_zev_into(path[k], site, gains, remaining, gravity, commanded[k])
+        seen[:6] = path[k, :6] + navigation
+        zem_zev_into(seen, site, gains, remaining, gravity, commanded[k])
         commanded[k] *= path[k, 6]
         saturate_into(commanded[k], vehicle[0], vehicle[1])
         flown, status = hold_period(
@@ -108,7 +125,7 @@ def _fly_plan(
     reference: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
     gains: tuple[float, float],
     timing: tuple[float, float],
-    thrust_error: float,
+    errors: tuple[float, NDArray[np.float64]],
     gravity: NDArray[np.float64],
     vehicle: VehicleNumbers,
     log: _Log,
@@ -121,6 +138,7 @@ def _fly_plan(
     time, path, commanded = log
     position, velocity, feedforward = reference
     period, plane = timing
+    thrust_error, navigation = errors
     periods = commanded.shape[0] - 1
     left = feedforward.shape[0]
     estimate = 0.0
@@ -135,8 +153,8 @@ def _fly_plan(
             break
         for axis in range(3):
             push = feedforward[k, axis]
-            push -= gains[0] * (path[k, axis] - position[k, axis])
-            push -= gains[1] * (path[k, 3 + axis] - velocity[k, axis])
+            push -= gains[0] * (path[k, axis] + navigation[axis] - position[k, axis])
+            push -= gains[1] * (path[k, 3 + axis] + navigation[3 + axis] - velocity[k, axis])
             commanded[k, axis] = path[k, 6] * push / (1.0 + estimate)
         saturate_into(commanded[k], vehicle[0], vehicle[1])
         flown, status = hold_period(
@@ -177,7 +195,7 @@ def fly_interval(
     lander: Lander,
     gravity: NDArray[np.float64],
     interval: tuple[float, int],
-    thrust_error: float,
+    errors: FlightErrors,
 ) -> Segment:
     """Fly a decision until the next look or the ground.
 
@@ -187,7 +205,7 @@ def fly_interval(
         lander: the vehicle, which saturates the thrust.
         gravity: [m/s^2] shape (3,), pointing down.
         interval: (control period [s], control periods to the next look).
-        thrust_error: relative error of the applied thrust over this interval.
+        errors: of the applied thrust and of the estimated state over this interval.
 
     Returns:
         The flown segment.
@@ -199,24 +217,25 @@ def fly_interval(
     time, path, commanded = np.empty(periods + 2), np.empty((periods + 2, 7)), np.empty((periods + 1, 3))
     vehicle = (lander.min_thrust, lander.max_thrust, lander.exhaust_velocity, lander.dry_mass)
     start, log, command = state.as_array(), (time, path, commanded), decision.command
+    drawn = (errors.thrust, errors.navigation)
     if isinstance(command, ZemZevCommand):
         gains = (command.position_gain, command.velocity_gain)
         clock = (command.time_to_go, command.time_to_go_rate, period)
-        nodes, status = _fly_zem_zev(start, decision.site, gains, clock, thrust_error, gravity, vehicle, log)
+        nodes, status = _fly_zem_zev(start, decision.site, gains, clock, drawn, gravity, vehicle, log)
         left = command.time_to_go - command.time_to_go_rate * float(time[nodes - 1])
     else:
         reference = command.reference
         _check_period(reference.control_period, period)
         parts = (reference.position, reference.velocity, reference.thrust_acceleration)
         timing = (period, float(decision.site[2]))
-        nodes, status = _fly_plan(start, parts, command.gains, timing, thrust_error, gravity, vehicle, log)
+        nodes, status = _fly_plan(start, parts, command.gains, timing, drawn, gravity, vehicle, log)
         left = reference.duration - float(time[nodes - 1])
     return Segment(
         time=time[:nodes],
         path=path[:nodes],
         commanded=commanded[: nodes - 1],
         time_to_go=left,
-        thrust_error=thrust_error,
+        thrust_error=errors.thrust,
         status=FlightStatus(status),
     )
 

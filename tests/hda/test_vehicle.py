@@ -18,7 +18,7 @@ from guidance import (
 )
 from hda.held_thrust import hold_period
 from hda.policy import Decision, ZemZevCommand
-from hda.vehicle import FlightStatus, Segment, fly_interval
+from hda.vehicle import FlightErrors, FlightStatus, Segment, fly_interval
 from tests.oracles import flown_interval
 
 GRAVITY = np.array(MOON_GRAVITY)
@@ -46,7 +46,7 @@ def fly(
     thrust_error: float = 0.0,
     lander: Lander = PAPER_LANDER,
 ) -> Segment:
-    return fly_interval(state, Decision(SITE, command), lander, GRAVITY, interval, thrust_error)
+    return fly_interval(state, Decision(SITE, command), lander, GRAVITY, interval, FlightErrors(thrust_error))
 
 
 def fall_time(height: float, climb: float) -> float:

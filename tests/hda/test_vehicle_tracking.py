@@ -9,7 +9,7 @@ from guidance.soft_landing import plan_soft_landing
 from guidance.state import State
 from guidance.tracking import TrackingReference, make_reference
 from hda.policy import Decision, PlanCommand
-from hda.vehicle import FlightStatus, fly_interval
+from hda.vehicle import FlightErrors, FlightStatus, fly_interval
 
 GRAVITY = np.array([0.0, 0.0, -1.62])
 GAINS = (0.9, 1.7)
@@ -56,7 +56,7 @@ def flight() -> tuple[State, TrackingReference]:
 
 def fly(state: State, reference: TrackingReference, error: float, periods: int = 10):
     decision = Decision(SITE, PlanCommand(reference, GAINS))
-    return fly_interval(state, decision, PAPER_LANDER, GRAVITY, (PERIOD, periods), error)
+    return fly_interval(state, decision, PAPER_LANDER, GRAVITY, (PERIOD, periods), FlightErrors(error))
 
 
 @pytest.mark.parametrize("error", [0.0, 0.04, -0.05])

@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 from guidance import MOON_GRAVITY, Lander, State, zem_zev_acceleration
 from hda.policy import Decision, DecisionStatus, ZemZevCommand
 from hda.presets import PRESETS
-from hda.vehicle import FlightStatus, fly_interval
+from hda.vehicle import FlightErrors, FlightStatus, fly_interval
 from studies.stability import Stability, study_stability
 from studies.stability_sweep import gain_box, mean_descent
 from studies.zem_zev_flight import (
@@ -200,7 +200,7 @@ def test_sampled_flight_against_the_vehicle(gains: Gains, time: float) -> None:
         lander,
         gravity,
         (PERIOD, clock.periods),
-        0.0,
+        FlightErrors(),
     )
     nodes = flown.path.shape[0] - 1 if flown.status != FlightStatus.FLYING else clock.periods + 1
     assert nodes >= 2
@@ -227,7 +227,7 @@ def test_mean_descent_touches_down_as_the_vehicle_does(gains: Gains) -> None:
             preset.lander,
             gravity,
             (PERIOD, clock.periods + 1),
-            0.0,
+            FlightErrors(),
         )
         assert flown.status == FlightStatus.TOUCHDOWN
         speed, moment = touch_down(ours, PERIOD, gravity)
