@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from hda.observation import Observation, ScenarioView
     from hda.outcome import Ending, Outcome
     from hda.policy import Decision, DecisionStatus, Policy, PrivilegedPolicy, ZemZevCommand
-    from hda.presets import PRESETS, sample_scenario
+    from hda.presets import PRESETS, place_preset, sample_scenario
     from hda.registry import PolicyEntry, make_policy, policy_names, register_policy
     from hda.safety_map import SafetyCriteria, SafetyMap, assess_safety
     from hda.scenario import Preset, Rules, Scenario, StartConditions
@@ -29,7 +29,7 @@ _HOMES = {
     "hda.observation": ("Observation", "ScenarioView"),
     "hda.outcome": ("Ending", "Outcome"),
     "hda.policy": ("Decision", "DecisionStatus", "Policy", "PrivilegedPolicy", "ZemZevCommand"),
-    "hda.presets": ("PRESETS", "sample_scenario"),
+    "hda.presets": ("PRESETS", "place_preset", "sample_scenario"),
     "hda.registry": ("PolicyEntry", "make_policy", "policy_names", "register_policy"),
     "hda.safety_map": ("SafetyCriteria", "SafetyMap", "assess_safety"),
     "hda.scenario": ("Preset", "Rules", "Scenario", "StartConditions"),
@@ -67,6 +67,7 @@ __all__ = [
     "load_tile",
     "make_policy",
     "make_tile",
+    "place_preset",
     "policy_names",
     "prepare_tiles",
     "register_policy",

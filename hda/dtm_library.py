@@ -2,7 +2,8 @@
 
 A tile's number is its seed. The splits never mix: training ground, ground to tune on, ground to evaluate on,
 and fresh ground for reliability runs. Every parameter of the terrain and of its assessment, and the format
-version, go into the cache key, so a change of any of them builds anew.
+version, go into the cache key, so a change of any of them builds anew. A terrain of a user's own
+(`hda.own_terrain`) is kept here too, under the hash of its file; its split is `own`.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import os
 import shutil
 import tempfile
 import zlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import suppress
 from dataclasses import asdict, dataclass
@@ -25,6 +26,7 @@ import numpy as np
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from guidance.kernel import cache_folder
+from hda.own_terrain import OWN_SPLIT, OwnTerrain, cut_tile
 from hda.safety_map import SafetyCriteria
 from hda.terrain import TerrainParameters, generate_terrain
 from hda.tile import Tile, make_tile
@@ -45,9 +47,9 @@ _verified: set[Path] = set()
 
 @dataclass(frozen=True)
 class Ground:
-    """What decides how a tile of a given number looks: the generator's and the assessment's parameters."""
+    """What decides how a tile of a given number looks: the terrain's and the assessment's parameters."""
 
-    terrain: TerrainParameters
+    terrain: TerrainParameters | OwnTerrain
     criteria: SafetyCriteria
 
     @property
@@ -57,7 +59,8 @@ class Ground:
 
     def description(self) -> str:
         """Every parameter as JSON, sorted."""
-        parts = {"format": FORMAT_VERSION, "terrain": asdict(self.terrain), "criteria": asdict(self.criteria)}
+        terrain = self.terrain.identity() if isinstance(self.terrain, OwnTerrain) else asdict(self.terrain)
+        parts = {"format": FORMAT_VERSION, "terrain": terrain, "criteria": asdict(self.criteria)}
         return json.dumps(parts, sort_keys=True, indent=1, default=str)
 
     def folder(self) -> Path:
@@ -65,27 +68,37 @@ class Ground:
         return cache_folder() / "terrain" / self.key
 
 
-def tile_numbers(split: str) -> range:
-    """Tile numbers of a split.
+def tile_numbers(split: str, ground: Ground | None = None) -> Sequence[int]:
+    """Tile numbers of a split; a terrain of a user's own has one split, `own`, and no other ground has it.
 
     Raises:
-        ValueError: there is no such split.
+        ValueError: there is no such split, or the ground does not have it.
     """
+    if ground is not None and isinstance(ground.terrain, OwnTerrain):
+        if split != OWN_SPLIT:
+            raise ValueError(f"split must be {OWN_SPLIT!r} for a terrain of your own, got {split!r}")
+        return ground.terrain.tiles
+    if split == OWN_SPLIT:
+        raise ValueError(f"split {OWN_SPLIT!r} needs a terrain of your own")
     if split not in SPLITS:
         raise ValueError(f"split must be one of {', '.join(SPLITS)}, got {split!r}")
     return SPLITS[split]
 
 
-def check_split(number: int, split: str) -> None:
+def check_split(number: int, split: str, ground: Ground | None = None) -> None:
     """Raise ValueError if tile `number` does not belong to `split`, so that splits never mix."""
-    if number not in tile_numbers(split):
-        raise ValueError(f"tile {number} does not belong to split {split!r} ({SPLITS[split]})")
+    numbers = tile_numbers(split, ground)
+    if number not in numbers:
+        shown = numbers if isinstance(numbers, range) else f"{len(numbers)} tiles"
+        raise ValueError(f"tile {number} does not belong to split {split!r} ({shown})")
 
 
 def build_tile(ground: Ground, number: int) -> Tile:
-    """Generate and assess one tile, without the cache."""
-    rng = np.random.default_rng(number)
-    dem = generate_terrain(ground.terrain, rng)
+    """Generate, or cut from the user's file, and assess one tile, without the cache."""
+    if isinstance(ground.terrain, OwnTerrain):
+        dem = cut_tile(ground.terrain, number)
+    else:
+        dem = generate_terrain(ground.terrain, np.random.default_rng(number))
     return make_tile(dem, ground.criteria, number, ground.terrain.maximum_elevation)
 
 
@@ -95,7 +108,7 @@ def load_tile(ground: Ground, number: int, split: str) -> Tile:
     Raises:
         ValueError: the tile does not belong to the split.
     """
-    check_split(number, split)
+    check_split(number, split, ground)
     return _open_or_build(ground, number)
 
 
@@ -111,9 +124,9 @@ def prepare_tiles(ground: Ground, split: str, workers: int = 2, numbers: Iterabl
     Raises:
         ValueError: a number does not belong to the split.
     """
-    wanted = list(tile_numbers(split) if numbers is None else numbers)
+    wanted = list(tile_numbers(split, ground) if numbers is None else numbers)
     for number in wanted:
-        check_split(number, split)
+        check_split(number, split, ground)
     missing = [number for number in wanted if not _tile_folder(ground, number).exists()]
     if not missing:
         return

@@ -8,12 +8,17 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
 
-from hda.dtm_library import Ground, load_tile, tile_numbers
+import numpy as np
+
+from hda.dtm_library import Ground, load_tile, prepare_tiles, tile_numbers
 from hda.islands import IslandField
+from hda.own_terrain import OWN_SPLIT, open_own_terrain
 from hda.random_streams import EpisodeStreams
 from hda.rocks import RockPopulation
-from hda.scenario import Preset, Scenario, draw_scenario
+from hda.scenario import Preset, Scenario, draw_scenario, draw_target
 from hda.terrain import TerrainParameters
 
 BLOCKY_ROCKS = RockPopulation(area_fraction=0.3, decay_constant=0.6, decay_slope=0.0)
@@ -26,14 +31,12 @@ BOULDERS = RockPopulation(
 )
 """Boulders of 0.8 m and more over a quarter of the ground: 0.008 % of it is left safe between the islands."""
 
+PAPER_TERRAIN = TerrainParameters(rocks=BLOCKY_ROCKS, islands=IslandField(20.0, threshold=-0.8))
 
 PRESETS: dict[str, Preset] = {
     preset.name: preset
     for preset in (
-        Preset(
-            name="paper",
-            terrain=TerrainParameters(rocks=BLOCKY_ROCKS, islands=IslandField(20.0, threshold=-0.8)),
-        ),
+        Preset(name="paper", terrain=PAPER_TERRAIN),
         Preset(
             name="hard",
             terrain=TerrainParameters(rocks=BOULDERS, islands=IslandField(25.0, threshold=-1.0)),
@@ -55,6 +58,45 @@ def find_preset(preset: str | Preset) -> Preset:
     return PRESETS[preset]
 
 
+def place_preset(
+    preset: str | Preset,
+    file: Path,
+    *,
+    pixel_size: float | None = None,
+    hazard_share: float | None = None,
+    workers: int = 2,
+) -> Preset:
+    """Put a setting on a user's own ground: the same rules, starts, sensor and lander on their terrain.
+
+    Every tile is built, cached, and tried for a first target, so that what cannot be flown fails here.
+    Scenarios are then drawn with `split="own"`.
+
+    Args:
+        preset: name of a preset, or a Preset.
+        file: GeoTIFF or .npy, see `hda.own_terrain.open_own_terrain`.
+        pixel_size: [m] of an .npy file; 1 if left out.
+        hazard_share: in place of the preset's; a smaller one lets episodes begin over safer ground.
+        workers: processes that build tiles.
+
+    Returns:
+        The preset, named after both.
+
+    Raises:
+        ValueError: an argument is out of range, the file cannot be used, or a tile has no place for a first
+            target.
+    """
+    setting = find_preset(preset)
+    start = setting.start if hazard_share is None else replace(setting.start, hazard_share=hazard_share)
+    terrain = open_own_terrain(file, pixel_size)
+    placed = replace(setting, name=f"{setting.name}-{terrain.file.stem}", terrain=terrain, start=start)
+    ground = Ground(terrain, placed.criteria)
+    prepare_tiles(ground, OWN_SPLIT, workers)
+    for number in terrain.tiles:
+        tile = load_tile(ground, number, OWN_SPLIT)
+        draw_target(tile, start, terrain.maximum_elevation, np.random.default_rng(number))
+    return placed
+
+
 def unknown_name(kind: str, name: object, valid: Iterable[str]) -> str:
     """Say that a name is unknown, with the nearest valid names first."""
     names = sorted(valid)
@@ -72,7 +114,8 @@ def sample_scenario(
         preset: name of a preset, or a Preset.
         study_seed: seed of the study, at least zero.
         episode: number of the episode, at least zero.
-        split: train, tuning, validation or fresh; evaluation belongs on the last two.
+        split: train, tuning, validation or fresh; evaluation belongs on the last two. `own` on a preset
+            from `place_preset`.
 
     Returns:
         The scenario. Its tile is built on first use and cached.
@@ -86,6 +129,6 @@ def sample_scenario(
         setting,
         EpisodeStreams(study_seed, episode),
         split,
-        tile_numbers(split),
+        tile_numbers(split, ground),
         lambda number: load_tile(ground, number, split),
     )

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rich.console import Console
 
 from hda.base_surface import rms_slope
-from hda.presets import PRESETS
+from hda.presets import PAPER_TERRAIN
 from hda.safety_map import DEFAULT_CRITERIA, SafetyCriteria, SafetyMap, assess_safety
 from hda.terrain import TerrainParameters, generate_terrain, terrain_rng
 
@@ -23,14 +23,13 @@ if TYPE_CHECKING:
 
 SUN_AZIMUTH = 315.0  # [deg] clockwise from north
 SUN_ELEVATION = 30.0  # [deg]
-DEFAULT_TERRAIN = PRESETS["paper"].terrain
 STEEPEST_SHOWN = 30.0  # [deg] upper end of the slope's colours
 
 
 def show_terrain(
     seed: int = 0,
     show: Annotated[Path | None, tyro.conf.arg(metavar="PATH")] = None,
-    parameters: Annotated[TerrainParameters, tyro.conf.arg(name="")] = DEFAULT_TERRAIN,
+    parameters: Annotated[TerrainParameters, tyro.conf.arg(name="")] = PAPER_TERRAIN,
     criteria: SafetyCriteria = DEFAULT_CRITERIA,
 ) -> None:
     """Make one tile, print what it is like and draw it.

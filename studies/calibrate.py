@@ -24,6 +24,7 @@ from guidance.validation import finite_number
 from hda.dtm_library import Ground, remove_tiles
 from hda.presets import PRESETS, find_preset, sample_scenario
 from hda.scenario import Preset
+from hda.terrain import TerrainParameters
 from studies.ground_statistics import GroundStatistics, measure_ground
 from studies.monte_carlo import Study, local_processes, prepare_study, run_study
 from studies.paper import PAPER_ROWS
@@ -108,6 +109,7 @@ def fly_single_divert(preset: Preset, episodes: int, workers: int, label: str) -
 
 def with_islands(preset: Preset, parameter: str, value: float) -> Preset:
     """The same setting with one field of the islands changed."""
+    assert isinstance(preset.terrain, TerrainParameters)
     islands = replace(preset.terrain.islands, **{parameter: value})
     return replace(preset, terrain=replace(preset.terrain, islands=islands))
 
@@ -192,6 +194,7 @@ def calibrate(options: Calibration) -> SingleDivertRow:
     options.out.mkdir(parents=True, exist_ok=True)
     if options.search:
         preset = search_islands(preset, options)
+    assert isinstance(preset.terrain, TerrainParameters)
     islands = preset.terrain.islands
     label = f"islands {islands.smoothing_scale:g} m, {islands.threshold:g} sigma"
     row = fly_single_divert(preset, options.episodes, options.workers, label)

@@ -33,10 +33,10 @@ from hda.safety_map import SafetyCriteria
 from hda.terrain import TerrainParameters
 from hda.tile import Tile
 
-SMALL = Ground(
-    TerrainParameters(size=100, craters=CraterPopulation(minimum_diameter=5.0, maximum_diameter=40.0)),
-    SafetyCriteria(),
+SMALL_TERRAIN = TerrainParameters(
+    size=100, craters=CraterPopulation(minimum_diameter=5.0, maximum_diameter=40.0)
 )
+SMALL = Ground(SMALL_TERRAIN, SafetyCriteria())
 LAYERS = ("elevation", "probability", "deterministic")
 
 
@@ -137,7 +137,7 @@ def test_an_unknown_split_is_named():
 def test_a_tile_is_the_terrain_of_its_number():
     tile = load_tile(SMALL, 3, "train")
     assert_equal(tile, build_tile(SMALL, 3))
-    dem = hda.terrain.generate_terrain(SMALL.terrain, np.random.default_rng(3))
+    dem = hda.terrain.generate_terrain(SMALL_TERRAIN, np.random.default_rng(3))
     np.testing.assert_allclose(tile.elevation, dem, atol=1e-5)
     assert float(tile.elevation.max()) == 50.0
     assert not np.array_equal(tile.elevation, load_tile(SMALL, 4, "train").elevation)
@@ -185,7 +185,7 @@ def test_files_hold_no_pickle_and_nothing_temporary_remains():
 
 def changed() -> list[Ground]:
     """SMALL with one parameter changed at a time."""
-    terrain, criteria = SMALL.terrain, SMALL.criteria
+    terrain, criteria = SMALL_TERRAIN, SMALL.criteria
     terrains = [
         replace(terrain, size=101),
         replace(terrain, pixel_size=0.5),

@@ -15,7 +15,7 @@ from scipy.stats import norm
 from hda.base_surface import BaseSurface, generate_base_surface, rms_slope
 from hda.craters import CraterPopulation, DepthLaw
 from hda.islands import IslandField, generate_island_field
-from hda.presets import PRESETS
+from hda.presets import PAPER_TERRAIN
 from hda.rocks import RockPopulation, rock_margin
 from hda.safety_map import assess_safety
 from hda.terrain import TerrainParameters, generate_terrain, terrain_rng
@@ -258,7 +258,7 @@ def test_the_command_draws_a_tile_and_says_what_it_is_like(tmp_path: Path, capsy
     tyro.cli(show_terrain, args=arguments)
     assert picture.read_bytes().startswith(b"\x89PNG")
     printed = capsys.readouterr().out
-    paper = PRESETS["paper"].terrain
+    paper = PAPER_TERRAIN
     small = replace(paper, size=150, rocks=replace(paper.rocks, area_fraction=0.05))
     hazard = 1.0 - assess_safety(tile(small, 3)).deterministic.mean()
     assert f"hazard share      {hazard:.3f}" in printed

@@ -5,6 +5,7 @@ import math
 import pytest
 
 from hda.presets import PRESETS, sample_scenario
+from hda.terrain import TerrainParameters
 from studies.calibrate import SEARCHES, fly_single_divert, interpolate_crossing, with_control_period
 from studies.ground_statistics import measure_ground
 
@@ -21,7 +22,9 @@ def test_a_sweep_that_misses_the_target_is_refused() -> None:
 
 def test_frozen_presets_lie_in_their_sweep() -> None:
     for name, search in SEARCHES.items():
-        value = getattr(PRESETS[name].terrain.islands, search.parameter)
+        terrain = PRESETS[name].terrain
+        assert isinstance(terrain, TerrainParameters)
+        value = getattr(terrain.islands, search.parameter)
         assert min(search.values) <= value <= max(search.values)
         assert value == round(value, search.digits)
 
