@@ -19,8 +19,10 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from guidance.validation import finite_number
-from hda.presets import find_preset
+from hda.own_terrain import OWN_SPLIT
+from hda.presets import find_preset, place_preset
 from hda.registry import policy_entry, policy_names
+from hda.scenario import Preset
 from studies.command_line import one_line_errors
 from studies.contract import check_contract
 from studies.monte_carlo import (
@@ -60,6 +62,10 @@ class Comparison:
         preset: the setting: paper or hard.
         study_seed: seed of the study; equal seeds give equal episodes.csv and table.csv.
         split: tile split: validation or fresh to evaluate, tuning for choices.
+        terrain: ground of your own in place of the preset's, GeoTIFF or .npy (1 m a cell, row 0 south); the
+            split is then `own`.
+        hazard_share: least share of unsafe ground around a first target on your terrain, 0 to 1; the preset's
+            by default.
         workers: processes; changes nothing but the time.
         out: folder for results; results/PRESET by default.
         resume: go on with the study in the folder, which must be the same; begins it where there is none.
@@ -73,6 +79,8 @@ class Comparison:
     preset: str = "paper"
     study_seed: int = 0
     split: str = "validation"
+    terrain: Path | None = None
+    hazard_share: float | None = None
     workers: int = 2
     out: Path | None = None
     resume: bool = False
@@ -91,9 +99,26 @@ def plan_study(options: Comparison) -> Study:
         finite_number(name, getattr(options, name), at_least=1)
     finite_number("study_seed", options.study_seed, at_least=0)
     policies, paths = choose_policies(options.policies)
-    return Study(
-        find_preset(options.preset), policies, options.episodes, options.study_seed, options.split, paths
+    preset, split = choose_ground(options)
+    return Study(preset, policies, options.episodes, options.study_seed, split, paths)
+
+
+def choose_ground(options: Comparison) -> tuple[Preset, str]:
+    """The setting, on the user's own terrain where one is given, and the split.
+
+    Raises:
+        ValueError: the preset is unknown, or the terrain cannot be flown over.
+    """
+    if options.terrain is None:
+        if options.hazard_share is not None:
+            raise ValueError("hazard_share is for a terrain of your own: give --terrain too")
+        return find_preset(options.preset), options.split
+    if options.split not in (Comparison.split, OWN_SPLIT):
+        raise ValueError(f"split must be {OWN_SPLIT!r} with a terrain of your own, got {options.split!r}")
+    preset = place_preset(
+        options.preset, options.terrain, hazard_share=options.hazard_share, workers=options.workers
     )
+    return preset, OWN_SPLIT
 
 
 def choose_policies(wanted: Sequence[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:

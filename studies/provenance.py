@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from hda.dtm_library import FORMAT_VERSION, Ground
+from hda.own_terrain import OwnTerrain
 from studies.monte_carlo import CHUNK_EPISODES, Study
 
 _PACKAGES = (
@@ -49,7 +50,9 @@ def _git(root: Path, *arguments: str) -> str:
 
 def identify_study(study: Study) -> dict[str, Any]:
     """All that decides the bytes of a study's rows: parameters, versions, digests of the sources."""
-    ground = Ground(study.preset.terrain, study.preset.criteria)
+    ground, preset = Ground(study.preset.terrain, study.preset.criteria), asdict(study.preset)
+    if isinstance(study.preset.terrain, OwnTerrain):
+        preset["terrain"] = study.preset.terrain.description()
     return {
         "study": {
             "episodes": study.episodes,
@@ -59,7 +62,7 @@ def identify_study(study: Study) -> dict[str, Any]:
             "paths": list(study.paths),
             "chunk_episodes": CHUNK_EPISODES,
         },
-        "preset": asdict(study.preset),
+        "preset": preset,
         "terrain_key": ground.key,
         "terrain_format": FORMAT_VERSION,
         "python": platform.python_version(),
