@@ -55,7 +55,7 @@ def solve_pdg(
         time_of_flight: [s] None searches for the best.
         nodes: N; the plan has N - 1 intervals of equal duration.
         method: 'convex' (lossless convexification in Clarabel; fast), 'cvxpy' (the same problem, written for
-            reading) or 'casadi' (the unrelaxed nonconvex problem by IPOPT).
+            reading) or 'casadi' (the unrelaxed nonconvex problem by fatrop or IPOPT).
         unreachable: what to do where the target is out of reach: 'raise', or plan to the softly reachable
             point 'nearest' to it in its plane (always by the convex method).
         guess: an earlier Plan of nearly the same flight: what is left of it seeds the search where the
