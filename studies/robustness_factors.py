@@ -1,0 +1,193 @@
+"""What the robustness sweep varies: each factor is one number of a preset, all else left as it is."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+from hda.islands import IslandField
+from hda.presets import unknown_name
+from hda.scenario import Preset, Range
+from hda.terrain import TerrainParameters
+
+
+@dataclass(frozen=True)
+class Factor:
+    """One number of a preset.
+
+    Attributes:
+        name: lower case, hyphens; also the name of files.
+        label: axis of the figure, with the unit.
+        nominal: gives the preset's own value.
+        levels: values to fly, those of most interest first: the first n make a sweep of n levels.
+        vary: gives the preset with another value.
+    """
+
+    name: str
+    label: str
+    nominal: Callable[[Preset], float]
+    levels: tuple[float, ...]
+    vary: Callable[[Preset, float], Preset]
+
+    def chosen(self, preset: Preset, count: int) -> tuple[float, ...]:
+        """The first `count` levels that differ from the preset's own value, rising."""
+        own = self.nominal(preset)
+        others = [level for level in self.levels if not math.isclose(level, own, abs_tol=1e-9)]
+        return tuple(sorted(others[:count]))
+
+
+def _rules(preset: Preset, **changes: float | int) -> Preset:
+    return replace(preset, rules=replace(preset.rules, **changes))
+
+
+def _lidar(preset: Preset, **changes: float) -> Preset:
+    return replace(preset, lidar=replace(preset.lidar, **changes))
+
+
+def _interval(preset: Preset, seconds: float) -> Preset:
+    """Looks further apart, and as much time for the whole flight as before."""
+    rules = preset.rules
+    most = math.ceil(rules.max_decisions * rules.decision_interval / seconds)
+    return _rules(preset, decision_interval=seconds, max_decisions=most)
+
+
+def _islands(preset: Preset) -> tuple[TerrainParameters, IslandField]:
+    terrain = preset.terrain
+    islands = getattr(terrain, "islands", None)
+    if not isinstance(terrain, TerrainParameters) or islands is None:
+        raise ValueError(f"hazard-share: preset {preset.name!r} has no islands of clear ground to vary")
+    return terrain, islands
+
+
+def _hazard_share(preset: Preset) -> float:
+    """Share of the ground off the islands: Phi(-threshold)."""
+    return 0.5 * math.erfc(_islands(preset)[1].threshold / math.sqrt(2.0))
+
+
+def _with_hazard_share(preset: Preset, share: float) -> Preset:
+    from scipy.special import ndtri
+
+    terrain, islands = _islands(preset)
+    moved = replace(islands, threshold=float(ndtri(1.0 - share)))
+    return replace(preset, terrain=replace(terrain, islands=moved))
+
+
+def _middle(span: Range) -> float:
+    return 0.5 * (span.low + span.high)
+
+
+def _moved(span: Range, middle: float) -> Range:
+    half = 0.5 * (span.high - span.low)
+    return Range(middle - half, middle + half)
+
+
+def _speed(preset: Preset, factor: float) -> Preset:
+    start = preset.start
+    faster = {
+        name: Range(factor * getattr(start, name).low, factor * getattr(start, name).high)
+        for name in ("descent_speed", "horizontal_speed")
+    }
+    return replace(preset, start=replace(start, **faster))
+
+
+FACTORS: dict[str, Factor] = {
+    factor.name: factor
+    for factor in (
+        Factor(
+            "thrust-error",
+            "bound of the relative thrust error",
+            lambda preset: preset.rules.thrust_error,
+            (0.3, 0.15, 0.1, 0.0, 0.2),
+            lambda preset, value: _rules(preset, thrust_error=value),
+        ),
+        Factor(
+            "map-noise",
+            "noise of the map at 500 m (1 sigma)",
+            lambda preset: preset.lidar.noise,
+            (0.3, 0.15, 0.1, 0.0, 0.2),
+            lambda preset, value: _lidar(preset, noise=value),
+        ),
+        Factor(
+            "slant-limit",
+            "sensor's limit off the vertical [deg]",
+            lambda preset: math.degrees(preset.lidar.off_nadir_limit),
+            (10.0, 14.0, 6.0, 17.0, 30.0),
+            lambda preset, value: _lidar(preset, off_nadir_limit=math.radians(value)),
+        ),
+        Factor(
+            "observation-interval",
+            "time between looks [s]",
+            lambda preset: preset.rules.decision_interval,
+            (10.0, 7.5, 2.5),
+            _interval,
+        ),
+        Factor(
+            "field-of-view",
+            "field of view [deg]",
+            lambda preset: math.degrees(preset.lidar.field_of_view),
+            (4.0, 7.0, 16.0, 2.0),
+            lambda preset, value: _lidar(preset, field_of_view=math.radians(value)),
+        ),
+        Factor(
+            "hazard-share",
+            "share of the ground without islands of clear ground",
+            _hazard_share,
+            (0.97, 0.9, 0.7, 0.94, 0.85),
+            _with_hazard_share,
+        ),
+        Factor(
+            "position-error",
+            "error of the estimated position, per axis (1 sigma) [m]",
+            lambda preset: preset.rules.navigation_position_error,
+            (5.0, 1.0, 2.0, 10.0),
+            lambda preset, value: _rules(preset, navigation_position_error=value),
+        ),
+        Factor(
+            "velocity-error",
+            "error of the estimated velocity, per axis (1 sigma) [m/s]",
+            lambda preset: preset.rules.navigation_velocity_error,
+            (0.5, 0.2, 0.1, 1.0),
+            lambda preset, value: _rules(preset, navigation_velocity_error=value),
+        ),
+        Factor(
+            "altitude",
+            "middle of the initial altitudes [m]",
+            lambda preset: _middle(preset.start.altitude),
+            (600.0, 750.0, 1200.0, 500.0),
+            lambda preset, value: replace(
+                preset, start=replace(preset.start, altitude=_moved(preset.start.altitude, value))
+            ),
+        ),
+        Factor(
+            "speed",
+            "initial speed, a factor",
+            lambda preset: 1.0,
+            (2.0, 1.5, 0.5, 2.5),
+            _speed,
+        ),
+        Factor(
+            "mass",
+            "middle of the initial masses [kg]",
+            lambda preset: _middle(preset.start.mass),
+            (1180.0, 1190.0, 1170.0, 1210.0),
+            lambda preset, value: replace(
+                preset, start=replace(preset.start, mass=_moved(preset.start.mass, value))
+            ),
+        ),
+    )
+}
+
+
+def choose_factors(wanted: Sequence[str]) -> tuple[Factor, ...]:
+    """Factors of the given names, in the table's order, each once; `all` is every one.
+
+    Raises:
+        ValueError: there is no such factor, or none was given.
+    """
+    if not wanted:
+        raise ValueError("factors must name at least one factor")
+    for name in wanted:
+        if name != "all" and name not in FACTORS:
+            raise ValueError(unknown_name("factor", name, ("all", *FACTORS)))
+    return tuple(factor for factor in FACTORS.values() if "all" in wanted or factor.name in wanted)
