@@ -219,7 +219,7 @@ def _ratio_cells(rows: Sequence[EpisodeRow], ratio: str) -> list[str]:
 
 def write_level_markdown(path: Path, sweep: Sweep) -> None:
     """Write the successes of a factor for a document: a line per policy, a column per level."""
-    levels = [f"**{level:.3g}**" if level == sweep.own else f"{level:.3g}" for level in sweep.levels]
+    levels = [f"**{level:g}**" if level == sweep.own else f"{level:g}" for level in sweep.levels]
     lines = [f"{sweep.factor.label}: success %, Wilson's 95 % interval; the preset's own value is bold", ""]
     lines += ["| policy | " + " | ".join(levels) + " |", "|---|" + "---:|" * len(levels)]
     for policy in sweep.levels[sweep.own]:
@@ -248,7 +248,7 @@ def write_breaks(out: Path, breaks: Sequence[Break], reasons: Sequence[str]) -> 
     lines.append("|---|---|---:|---:|---:|---|---|")
     for b, reason in zip(breaks, reasons, strict=True):
         drop = "{:.1f} ({:.1f}-{:.1f})".format(*(100 * v for v in (b.drop.estimate, b.drop.low, b.drop.high)))
-        cells = [b.factor, b.policy, f"{b.level:.3g}", f"{100 * b.success:.1f}", drop, b.ending, reason]
+        cells = [b.factor, b.policy, f"{b.level:g}", f"{100 * b.success:.1f}", drop, b.ending, reason]
         lines.append("| " + " | ".join(cells) + " |")
     (out / "breaks.md").write_text("\n".join(lines) + "\n")
 
@@ -258,15 +258,16 @@ def print_sweeps(sweeps: Sequence[Sweep]) -> None:
     console = Console()
     for sweep in sweeps:
         if not sweep.breaks:
-            console.print(f"{sweep.factor.name}: no policy breaks", highlight=False)
+            console.print(f"{sweep.factor.name}: no policy breaks", highlight=False, markup=False)
             continue
         first = sweep.breaks[0]
         same = [b.policy for b in sweep.breaks[1:] if (b.step, b.side) == (first.step, first.side)]
         tail = f"; also {', '.join(same)}" if same else ""
         console.print(
-            f"{sweep.factor.name}: {first.policy} breaks first, at {first.level:.3g} ({sweep.factor.label}):"
+            f"{sweep.factor.name}: {first.policy} breaks first, at {first.level:g} ({sweep.factor.label}):"
             f" success falls by {100.0 * first.drop.estimate:.1f} points, mostly {first.ending}{tail}",
             highlight=False,
+            markup=False,
         )
 
 
