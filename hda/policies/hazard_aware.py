@@ -17,14 +17,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from guidance.constants import MOON_GRAVITY
 from guidance.kernel import compile_kernel
+from guidance.lander import Lander
+from guidance.state import State
 from guidance.two_impulse import divert_cost
 from guidance.validation import finite_number
 from hda.belief import SafetyBelief
+from hda.lidar import Lidar
 from hda.observation import Observation, ScenarioView
 from hda.surroundings import infer_unseen
 
@@ -170,8 +175,20 @@ def propellant_map(observation: Observation, view: ScenarioView, belief: SafetyB
 def summed_area(density: NDArray[np.float32]) -> Array:
     """Integral image, shape (n + 1, n + 1): entry (i, j) is the sum over rows below i and columns below j."""
     out = np.zeros((density.shape[0] + 1, density.shape[1] + 1))
-    np.cumsum(np.cumsum(density, axis=0, dtype=np.float64), axis=1, out=out[1:, 1:])
+    _sum_into(density, out)
     return out
+
+
+@compile_kernel
+def _sum_into(density: NDArray[np.float32], out: Array) -> None:
+    rows, columns = density.shape
+    below = np.zeros(columns)
+    for row in range(rows):
+        total = 0.0
+        for column in range(columns):
+            below[column] += density[row, column]
+            total += below[column]
+            out[row + 1, column + 1] = total
 
 
 @compile_kernel
@@ -263,7 +280,14 @@ class HazardAwareSite:
 
     def begin(self, view: ScenarioView) -> HazardAwareMemory:
         """Nothing seen yet."""
+        load_kernels()
         return HazardAwareMemory(view)
+
+    def price(self, observation: Observation, view: ScenarioView, belief: SafetyBelief) -> Array:
+        """[kg] J of every cell of the belief's square, shape (n, n)."""
+        safe = infer_unseen(belief.probability(), belief.seen)
+        next_look = predict_next_look(observation, view, belief.corner, self.weights.commit_time)
+        return price_sites(safe, propellant_map(observation, view, belief), next_look, self.weights)
 
     def select(self, observation: Observation, memory: HazardAwareMemory) -> tuple[Array, HazardAwareMemory]:
         """Fuse the look, price every cell, and move if another gains enough."""
@@ -278,11 +302,22 @@ class HazardAwareSite:
         height = float(observation.state.position[2] - observation.target[2])
         if height <= 0.0 or (not first and observation.time_to_go <= self.weights.commit_time):
             return observation.target, memory
-        safe = infer_unseen(belief.probability(), belief.seen)
-        next_look = predict_next_look(observation, view, belief.corner, self.weights.commit_time)
-        price = price_sites(safe, propellant_map(observation, view, belief), next_look, self.weights)
+        price = self.price(observation, view, belief)
         best = divmod(int(np.argmin(price)), price.shape[1])
         present = belief.cell(observation.target)
         if present is not None and price[present] <= price[best] + self.weights.switch_gain:
             return observation.target, memory
         return belief.site(*best, float(observation.target[2])), memory
+
+
+@lru_cache(maxsize=1)
+def load_kernels() -> None:
+    """Price a small blank square once per process: the first decision must not wait for compiled code."""
+    gravity, plane = np.array(MOON_GRAVITY), np.zeros(3)
+    lidar, lander = Lidar(), Lander()
+    view = ScenarioView(lander, gravity, plane, 5.0, 0.5, lidar.field_of_view, lidar.off_nadir_limit, lidar)
+    state = State(np.array([0.0, 0.0, 100.0]), np.zeros(3), 1200.0)
+    reading = np.ones((lidar.pixels, lidar.pixels), dtype=np.float32)
+    observation = Observation(0, 0.0, state, plane, reading, 16.0, 20.0)
+    belief = SafetyBelief.blank(plane, 2 * _LATTICE).fused(observation, lidar)
+    HazardAwareSite().price(observation, view, belief)

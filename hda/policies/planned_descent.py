@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from guidance.lander import Lander
 from guidance.plan import PlanStatus
 from guidance.soft_landing import DEFAULT_OPTIONS, SoftLanding, SoftLandingOptions, plan_soft_landing
+from guidance.state import State
 from guidance.tracking import DEFAULT_WEIGHTS, TrackingReference, TrackingWeights, tracking_gains
 from hda.observation import Observation, ScenarioView
 from hda.policies.zem_zev import FixedGainZemZev
@@ -48,7 +51,8 @@ class PlannedDescent:
     commit_time: float = 10.0
 
     def begin(self, view: ScenarioView) -> DescentMemory:
-        """No plan yet."""
+        """No plan yet; the planner is made ready here, so that the first decision does not wait for it."""
+        _load_planner(self.options, self.weights, view.control_period)
         return DescentMemory(view)
 
     def command(
@@ -98,3 +102,12 @@ class PlannedDescent:
         gains = tracking_gains(view.control_period, self.weights)
         periods = round(view.decision_interval / view.control_period)
         return PlanCommand(reference, gains), status, replace(memory, reference=reference.after(periods))
+
+
+@lru_cache(maxsize=8)
+def _load_planner(options: SoftLandingOptions, weights: TrackingWeights, control_period: float) -> None:
+    """Plan a descent once per process: compiled code is loaded and the programme's sparsity is set up."""
+    tracking_gains(control_period, weights)
+    state = State(np.array([200.0, 100.0, 900.0]), np.array([-8.0, -4.0, -30.0]), 1200.0)
+    if options.method == "convex":
+        plan_soft_landing(state, np.zeros(3), Lander(), control_period, options)
