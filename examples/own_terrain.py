@@ -19,7 +19,7 @@ def write_site(path: str, seed: int = 50_000) -> None:
     """Write one tile, with a strip of unknown ground along its west edge."""
     heights = generate_terrain(PAPER_TERRAIN, terrain_rng(seed))
     heights[:, :20] = np.nan
-    np.save(path, heights)
+    np.save(path, heights, allow_pickle=False)
 
 
 if __name__ == "__main__":

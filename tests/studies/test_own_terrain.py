@@ -19,6 +19,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_a_study_over_own_ground(site: Path, tmp_path: Path) -> None:
     options = Comparison(
         episodes=3,
