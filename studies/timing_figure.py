@@ -29,11 +29,11 @@ def draw_timing(path: Path, methods: Sequence[Method], calls: Sequence[Call]) ->
         own = [call for call in calls if call.method == method.label and call.feasible]
         if not own:
             continue
-        walls = np.sort([1e3 * call.seconds for call in own])
+        times = np.sort([1e3 * call.processor for call in own])
         dashes = ("-" if method.free else "--") if method.nodes > 31 else ("-." if method.free else ":")
         share.step(
-            walls,
-            100.0 * np.arange(1, walls.size + 1) / walls.size,
+            times,
+            100.0 * np.arange(1, times.size + 1) / times.size,
             where="post",
             color=color,
             linestyle=dashes,
@@ -43,22 +43,22 @@ def draw_timing(path: Path, methods: Sequence[Method], calls: Sequence[Call]) ->
         if regrets:
             marker = "o" if method.free else "s"
             middle = max(float(np.median(regrets)), _LEAST_REGRET)
-            cost.plot(np.median(walls), middle, marker, color=color, markersize=8)
+            cost.plot(np.median(times), middle, marker, color=color, markersize=8)
             cost.annotate(
                 str(method.nodes),
-                (float(np.median(walls)), middle),
+                (float(np.median(times)), middle),
                 xytext=(6, 6),
                 textcoords="offset points",
                 fontsize="small",
             )
     share.set_xscale("log")
-    share.set_xlabel("wall time of a call [ms]")
+    share.set_xlabel("processor time of a call [ms]")
     share.set_ylabel("calls on feasible cases done [%]")
     figure.legend(loc="outside lower center", ncols=5, fontsize="small", title="method, time, nodes")
     cost.set_xscale("log")
     cost.set_yscale("log")
     cost.margins(0.2)
-    cost.set_xlabel("median wall time [ms]")
+    cost.set_xlabel("median processor time [ms]")
     cost.set_ylabel("median propellant beyond the tight optimum [g]")
     cost.set_title("round: free time of flight; square: fixed; number: nodes", fontsize="medium")
     for axis in (share, cost):

@@ -10,13 +10,17 @@ from pathlib import Path
 import numpy as np
 
 from guidance import InfeasibleError, Lander, Plan, SolverFailedError, State, solve_pdg
+from guidance.nonlinear_program import NonlinearSolver, fatrop_present
 from guidance.pdg import DEFAULT_NODES
 from guidance.problem import LandingProblem
+from guidance.reference_casadi import plan_casadi
 from hda.presets import sample_scenario
 from studies.timing_peer import gfold_present, plan_gfold
 
 PEER_NODES = 30
 _TIGHT_NODES = 201
+IPOPT_METHOD = "casadi, IPOPT alone"
+FATROP_METHOD = "casadi, fatrop alone"
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,6 +151,13 @@ def _by_casadi(problem: LandingProblem, nodes: int, time_of_flight: float | None
     return ask(problem, nodes, time_of_flight, "casadi")
 
 
+def _by_one_solver(solver: NonlinearSolver) -> Callable[[LandingProblem, int, float | None], Plan]:
+    def plan(problem: LandingProblem, nodes: int, time_of_flight: float | None) -> Plan:
+        return plan_casadi(problem, nodes, time_of_flight, solver=solver)
+
+    return plan
+
+
 def _by_cvxpy(problem: LandingProblem, nodes: int, time_of_flight: float | None) -> Plan:
     return ask(problem, nodes, time_of_flight, "cvxpy")
 
@@ -166,6 +177,10 @@ def timed_methods() -> list[Method]:
     methods += [Method("cvxpy, DPP", DEFAULT_NODES, free, _by_cvxpy) for free in (True, False)]
     methods.append(Method("cvxpy, rebuilt", DEFAULT_NODES, False, _by_cvxpy, _forget_cvxpy_model))
     methods += [Method("casadi", DEFAULT_NODES, free, _by_casadi) for free in (True, False)]
+    methods += [Method(IPOPT_METHOD, DEFAULT_NODES, free, _by_one_solver("ipopt")) for free in (True, False)]
+    if fatrop_present():
+        alone = _by_one_solver("fatrop")
+        methods += [Method(FATROP_METHOD, DEFAULT_NODES, free, alone) for free in (True, False)]
     if gfold_present():
         methods += [Method("gfold", PEER_NODES, free, plan_gfold) for free in (True, False)]
         methods.append(Method("gfold", DEFAULT_NODES, True, plan_gfold))
