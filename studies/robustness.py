@@ -35,9 +35,9 @@ from studies.points import Point, Rows, fly_points
 from studies.provenance import describe_study, write_provenance
 from studies.robustness_breaks import Break, find_breaks, success_drop
 from studies.robustness_factors import FACTORS, Factor, choose_factors
-from studies.rows import EpisodeRow
-from studies.statistics import bootstrap_mean, clustered_interval, wilson_interval
+from studies.statistics import wilson_interval
 from studies.study_folder import Existing
+from studies.table import summarize_policy
 
 _NOMINAL = "nominal"
 _EXPLAINED = 12  # failures of a break that are flown again
@@ -191,30 +191,24 @@ def write_levels(path: Path, sweep: Sweep, study_seed: int) -> None:
         header += [f"{ratio}_{end}" for end in ("percent", "low", "high", "tile_low", "tile_high")]
     header += [f"propellant_percent{end}" for end in ("", "_low", "_high")]
     header += ["success_drop_points", "drop_low", "drop_high", *(e.replace("-", "_") for e in endings)]
-    drops = sweep.levels[sweep.own]
+    nominal = sweep.levels[sweep.own]
     with path.open("w", newline="") as stream:
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(header)
         for level, policies in sweep.levels.items():
             for policy, rows in policies.items():
+                privileged = policy_entry(policy).privileged
+                s = summarize_policy(rows, rows, sweep.factor.name, study_seed, privileged)
                 cells: list[object] = [sweep.factor.name, f"{level:.6g}", level == sweep.own]
-                cells += [f"{100.0 * sweep.hazard[level]:.4g}", policy, policy_entry(policy).privileged]
-                cells += [len(rows), *_ratio_cells(rows, "safe_site"), *_ratio_cells(rows, "success")]
-                burnt = np.array([row.propellant_percent for row in rows])
-                mean = bootstrap_mean(burnt, np.random.default_rng([study_seed, 0]))
-                cells += [f"{value:.9g}" for value in (mean.estimate, mean.low, mean.high)]
-                drop = success_drop(drops[policy], rows)
+                cells += [f"{100.0 * sweep.hazard[level]:.4g}", policy, privileged, len(rows)]
+                for plain, tiled in ((s.safe_site, s.safe_site_by_tile), (s.success, s.success_by_tile)):
+                    ends = (plain.estimate, plain.low, plain.high, tiled.low, tiled.high)
+                    cells += [f"{100.0 * value:.9g}" for value in ends]
+                burnt, drop = s.means["propellant_percent"], success_drop(nominal[policy], rows)
+                cells += [f"{value:.9g}" for value in (burnt.estimate, burnt.low, burnt.high)]
                 cells += [f"{100.0 * value:.9g}" for value in (drop.estimate, drop.low, drop.high)]
                 counts = Counter(row.outcome for row in rows)
                 writer.writerow([*cells, *(counts[name] for name in endings)])
-
-
-def _ratio_cells(rows: Sequence[EpisodeRow], ratio: str) -> list[str]:
-    hits = np.array([getattr(row, ratio) for row in rows])
-    plain = wilson_interval(int(hits.sum()), hits.size)
-    tiled = clustered_interval(hits, np.array([row.tile for row in rows]))
-    ends = (plain.estimate, plain.low, plain.high, tiled.low, tiled.high)
-    return [f"{100.0 * value:.9g}" for value in ends]
 
 
 def write_level_markdown(path: Path, sweep: Sweep) -> None:
