@@ -85,7 +85,7 @@ def draw_flight(path: Path, record: EpisodeRecord) -> None:
 
     figure = Figure(figsize=(14, 6.5), layout="constrained")
     grid = figure.add_gridspec(3, 2, width_ratios=(1.1, 1.0))
-    _draw_ground_track(figure.add_subplot(grid[:, 0]), record)
+    draw_ground_track(figure.add_subplot(grid[:, 0]), record)
     altitude = figure.add_subplot(grid[0, 1])
     speed = figure.add_subplot(grid[1, 1], sharex=altitude)
     thrust = figure.add_subplot(grid[2, 1], sharex=altitude)
@@ -111,7 +111,8 @@ def draw_flight(path: Path, record: EpisodeRecord) -> None:
     figure.savefig(path, dpi=110)
 
 
-def _draw_ground_track(axis: Axes, record: EpisodeRecord) -> None:
+def draw_ground_track(axis: Axes, record: EpisodeRecord) -> None:
+    """Draw a flight over the true safety map, with its targets and its field of view at each look."""
     from matplotlib.patches import Rectangle
 
     tile = record.scenario.tile
