@@ -31,13 +31,13 @@ from studies.command_line import one_line_errors
 from studies.compare import choose_policies, open_folder
 from studies.failure_causes import explain_failure
 from studies.monte_carlo import Study
+from studies.point_score import SCORE_COLUMNS, score_rows
 from studies.points import Point, Rows, fly_points
 from studies.provenance import describe_study, write_provenance
 from studies.robustness_breaks import Break, find_breaks, success_drop
 from studies.robustness_factors import FACTORS, Factor, choose_factors
 from studies.statistics import wilson_interval
 from studies.study_folder import Existing
-from studies.table import summarize_policy
 
 _NOMINAL = "nominal"
 _EXPLAINED = 12  # failures of a break that are flown again
@@ -187,25 +187,18 @@ def write_levels(path: Path, sweep: Sweep, study_seed: int) -> None:
     """Write every level and policy of a factor as CSV; ratios in percent."""
     endings = ("hard-landing", "unsafe-site", "crash", "tank-empty", "timed-out")
     header = ["factor", "level", "own_value", "hazard_percent", "policy", "privileged", "episodes"]
-    for ratio in ("safe_site", "success"):
-        header += [f"{ratio}_{end}" for end in ("percent", "low", "high", "tile_low", "tile_high")]
-    header += [f"propellant_percent{end}" for end in ("", "_low", "_high")]
-    header += ["success_drop_points", "drop_low", "drop_high", *(e.replace("-", "_") for e in endings)]
+    header += [*SCORE_COLUMNS, "success_drop_points", "drop_low", "drop_high"]
+    header += [name.replace("-", "_") for name in endings]
     nominal = sweep.levels[sweep.own]
     with path.open("w", newline="") as stream:
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(header)
         for level, policies in sweep.levels.items():
             for policy, rows in policies.items():
-                privileged = policy_entry(policy).privileged
-                s = summarize_policy(rows, rows, sweep.factor.name, study_seed, privileged)
                 cells: list[object] = [sweep.factor.name, f"{level:.6g}", level == sweep.own]
-                cells += [f"{100.0 * sweep.hazard[level]:.4g}", policy, privileged, len(rows)]
-                for plain, tiled in ((s.safe_site, s.safe_site_by_tile), (s.success, s.success_by_tile)):
-                    ends = (plain.estimate, plain.low, plain.high, tiled.low, tiled.high)
-                    cells += [f"{100.0 * value:.9g}" for value in ends]
-                burnt, drop = s.means["propellant_percent"], success_drop(nominal[policy], rows)
-                cells += [f"{value:.9g}" for value in (burnt.estimate, burnt.low, burnt.high)]
+                cells += [f"{100.0 * sweep.hazard[level]:.4g}", policy, policy_entry(policy).privileged]
+                cells += [len(rows), *score_rows(rows, study_seed).cells()]
+                drop = success_drop(nominal[policy], rows)
                 cells += [f"{100.0 * value:.9g}" for value in (drop.estimate, drop.low, drop.high)]
                 counts = Counter(row.outcome for row in rows)
                 writer.writerow([*cells, *(counts[name] for name in endings)])

@@ -11,7 +11,7 @@ from __future__ import annotations
 import csv
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
@@ -29,11 +29,11 @@ from hda.scenario import Preset
 from studies.command_line import one_line_errors
 from studies.compare import choose_policies, open_folder
 from studies.monte_carlo import Study
+from studies.point_score import SCORE_COLUMNS, PointScore, score_rows
 from studies.points import Point, Rows, fly_points
 from studies.provenance import describe_study, write_provenance
 from studies.statistics import Interval, bootstrap_mean, wilson_interval
 from studies.study_folder import Existing
-from studies.table import PolicySummary, summarize_policy
 from studies.weight_sweep import SWEEP, sweep_name, sweep_path
 
 BASE = "hazard-aware"
@@ -82,17 +82,23 @@ class TradeOffRow:
     """One point of the picture.
 
     Attributes:
+        preset: name of the setting.
         split: tile split that it was flown on.
+        policy: name.
         weight: weight that was changed; empty for a registered policy.
         value: of that weight; nan for a registered policy.
-        summary: ratios and means with their intervals.
+        privileged: it sees the true map.
+        score: ratios and propellant with their intervals.
         on_front: no policy of the same preset and split that sees no truth beats it in both.
     """
 
+    preset: str
     split: str
+    policy: str
     weight: str
     value: float
-    summary: PolicySummary
+    privileged: bool
+    score: PointScore
     on_front: bool = False
 
 
@@ -152,38 +158,32 @@ def plan_points(options: TradeOff) -> list[Point]:
 def score_point(study: Study, rows: Rows) -> list[TradeOffRow]:
     """Score every policy of a study, and say which are on the front."""
     changed = {sweep_name(weight, value): (weight, value) for weight, value in choose_weights(("all",))}
+    for path in study.paths:
+        policy_entry(path)  # registers what is known by path
     scored = []
     for name in study.policies:
-        if study.paths and ":" not in name:
-            study.make_policy(name)  # registers what is known by path
-        privileged = policy_entry(name).privileged
-        summary = summarize_policy(rows[name], rows[name], study.preset.name, study.study_seed, privileged)
         weight, value = changed.get(name, ("", float("nan")))
-        scored.append(TradeOffRow(study.split, weight, value, summary))
-    front = find_front([row.summary for row in scored])
-    return [
-        TradeOffRow(row.split, row.weight, row.value, row.summary, row.summary.policy in front)
-        for row in scored
-    ]
+        score = score_rows(rows[name], study.study_seed)
+        privileged = policy_entry(name).privileged
+        scored.append(TradeOffRow(study.preset.name, study.split, name, weight, value, privileged, score))
+    front = find_front(scored)
+    return [replace(row, on_front=row.policy in front) for row in scored]
 
 
-def find_front(summaries: Sequence[PolicySummary]) -> set[str]:
+def find_front(rows: Sequence[TradeOffRow]) -> set[str]:
     """Policies that see no truth and that none of them beats: as safe on less, or safer on as little."""
-
-    def place(summary: PolicySummary) -> tuple[float, float]:
-        return summary.safe_site.estimate, summary.means["propellant_percent"].estimate
-
-    open_ones = [summary for summary in summaries if not summary.privileged]
-    front = set()
-    for one in open_ones:
-        safe, burnt = place(one)
-        beaten = any(
-            other_safe >= safe and other_burnt <= burnt and (other_safe, other_burnt) != (safe, burnt)
-            for other_safe, other_burnt in map(place, open_ones)
+    places = {
+        row.policy: (row.score.safe_site.estimate, row.score.propellant.estimate)
+        for row in rows
+        if not row.privileged
+    }
+    return {
+        policy
+        for policy, (safe, burnt) in places.items()
+        if not any(
+            other != (safe, burnt) and other[0] >= safe and other[1] <= burnt for other in places.values()
         )
-        if not beaten:
-            front.add(one.policy)
-    return front
+    }
 
 
 def bound_preset(preset: Preset, options: TradeOff) -> Bounds:
@@ -225,33 +225,23 @@ def run_trade_off(options: TradeOff) -> tuple[list[TradeOffRow], list[Bounds]]:
 
 def write_rows(path: Path, rows: Sequence[TradeOffRow]) -> None:
     """Write every point as CSV; ratios and propellant in percent."""
-    header = ["preset", "split", "policy", "weight", "value", "episodes", "privileged", "on_front"]
-    for name in ("safe_site", "success"):
-        header += [f"{name}_{end}" for end in ("percent", "low", "high", "tile_low", "tile_high")]
-    header += [f"propellant_percent{end}" for end in ("", "_low", "_high")]
+    header = ["preset", "split", "policy", "weight", "value", "privileged", "on_front", "episodes"]
     with path.open("w", newline="") as stream:
         writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(header)
+        writer.writerow([*header, *SCORE_COLUMNS])
         for row in rows:
-            s = row.summary
-            cells: list[object] = [s.preset, row.split, s.policy, row.weight]
-            cells += ["" if np.isnan(row.value) else f"{row.value:g}", s.episodes, s.privileged, row.on_front]
-            for plain, tiled in ((s.safe_site, s.safe_site_by_tile), (s.success, s.success_by_tile)):
-                ends = (plain.estimate, plain.low, plain.high, tiled.low, tiled.high)
-                cells += [f"{100.0 * value:.9g}" for value in ends]
-            burnt = s.means["propellant_percent"]
-            cells += [f"{value:.9g}" for value in (burnt.estimate, burnt.low, burnt.high)]
-            writer.writerow(cells)
+            value = "" if np.isnan(row.value) else f"{row.value:g}"
+            cells = [row.preset, row.split, row.policy, row.weight, value, row.privileged, row.on_front]
+            writer.writerow([*cells, row.score.episodes, *row.score.cells()])
 
 
 def _cells(row: TradeOffRow) -> list[str]:
-    s = row.summary
-    safe, tiled, burnt = s.safe_site, s.safe_site_by_tile, s.means["propellant_percent"]
+    safe, tiled, burnt = row.score.safe_site, row.score.safe_site_by_tile, row.score.propellant
     ends = (safe.estimate, safe.low, safe.high, tiled.low, tiled.high)
     return [
-        s.policy + (" *" if s.privileged else ""),
+        row.policy + (" *" if row.privileged else ""),
         "{:.1f} ({:.1f}-{:.1f}) [{:.1f}-{:.1f}]".format(*(100.0 * value for value in ends)),
-        f"{100.0 * s.success.estimate:.1f}",
+        f"{100.0 * row.score.success.estimate:.1f}",
         f"{burnt.estimate:.2f} ({burnt.low:.2f}-{burnt.high:.2f})",
         "yes" if row.on_front else "",
     ]
@@ -263,7 +253,7 @@ _HEADINGS = ("preset", "tiles", "policy", "safe site %", "success %", "propellan
 def write_markdown(path: Path, rows: Sequence[TradeOffRow]) -> None:
     """Write the points for a document."""
     lines = ["| " + " | ".join(_HEADINGS) + " |", "|---|---|---|---:|---:|---:|---|"]
-    lines += ["| " + " | ".join([row.summary.preset, row.split, *_cells(row)]) + " |" for row in rows]
+    lines += ["| " + " | ".join([row.preset, row.split, *_cells(row)]) + " |" for row in rows]
     path.write_text("\n".join(lines) + "\n")
 
 
@@ -287,7 +277,7 @@ def print_trade_off(rows: Sequence[TradeOffRow], bounds: Sequence[Bounds]) -> No
     for heading in _HEADINGS:
         table.add_column(heading, no_wrap=heading == "policy")
     for row in rows:
-        table.add_row(row.summary.preset, row.split, *(cell.replace("[", "\\[") for cell in _cells(row)))
+        table.add_row(row.preset, row.split, *(cell.replace("[", "\\[") for cell in _cells(row)))
     console = Console(width=max(Console().width, 130))
     console.print(table)
     for b in bounds:

@@ -22,12 +22,12 @@ def draw_trade_off(path: Path, rows: Sequence[TradeOffRow], bounds: Sequence[Bou
     """Draw a column per preset: the policies above, the sweeps of the weights below."""
     from matplotlib.figure import Figure
 
-    presets = list(dict.fromkeys(row.summary.preset for row in rows))
+    presets = list(dict.fromkeys(row.preset for row in rows))
     swept = any(row.weight for row in rows)
     figure = Figure(figsize=(1.5 + 5.4 * len(presets), 4.6 * (1 + swept)), layout="constrained")
     axes = figure.subplots(1 + swept, len(presets), squeeze=False)
     for column, preset in enumerate(presets):
-        own = [row for row in rows if row.summary.preset == preset]
+        own = [row for row in rows if row.preset == preset]
         weights = [row for row in own if row.weight]
         splits = {row.split for row in weights}
         floor = next(b.floor.estimate for b in bounds if b.preset == preset)
@@ -45,8 +45,7 @@ def draw_trade_off(path: Path, rows: Sequence[TradeOffRow], bounds: Sequence[Bou
 
 def _ends(row: TradeOffRow) -> tuple[list[float], list[float], list[float]]:
     """Middle, low and high of (propellant, safe site, safe site by tile), in percent."""
-    s = row.summary
-    triples = (s.means["propellant_percent"], s.safe_site, s.safe_site_by_tile)
+    triples = (row.score.propellant, row.score.safe_site, row.score.safe_site_by_tile)
     factors = (1.0, 100.0, 100.0)
     middle, low, high = (
         [factor * getattr(interval, end) for factor, interval in zip(factors, triples, strict=True)]
@@ -67,7 +66,7 @@ def _draw_point(axis: Axes, row: TradeOffRow, color: str, marker: str, label: st
         color=color,
         marker=marker,
         markersize=6,
-        markerfacecolor="white" if row.summary.privileged else color,
+        markerfacecolor="white" if row.privileged else color,
         elinewidth=1.6,
         capsize=2,
         linestyle="none",
@@ -77,7 +76,7 @@ def _draw_point(axis: Axes, row: TradeOffRow, color: str, marker: str, label: st
 
 def _draw_policies(axis: Axes, rows: Sequence[TradeOffRow], floor: float) -> None:
     for k, row in enumerate(rows):
-        name = row.summary.policy + (" *" if row.summary.privileged else "")
+        name = row.policy + (" *" if row.privileged else "")
         _draw_point(axis, row, COLORS[k % len(COLORS)], _MARKERS[k % len(_MARKERS)], name)
     front = sorted(_ends(row)[0][:2] for row in rows if row.on_front)
     axis.step(*np.array(front).T, where="post", color="0.3", linewidth=1.0, linestyle="--", label="front")
