@@ -7,21 +7,28 @@ from typing import TYPE_CHECKING, Any
 
 from torch import nn
 
+from rl.algorithms import RecurrentSettings
 from rl.artefacts import Tensors
 from rl.encoding import ENCODING_VERSION, LATENT_SIZE, LAYOUTS
 from rl.latent import load_autoencoder, load_encoder
 from rl.networks import Perceptron
 from rl.policy import Actor, ActorPolicy
+from rl.recurrent_inference import RecurrentNetwork
+from rl.recurrent_networks import RecurrentActor
+from rl.recurrent_policy import MemoryActor, RecurrentActorPolicy
 
 if TYPE_CHECKING:
     from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
 
     from rl.algorithms import AgentSettings
+    from rl.td3_lstm import RecurrentTD3
 
 
-def actor_tensors(algorithm: OffPolicyAlgorithm) -> Tensors:
-    """Dense layers of the actor, in order; for a stochastic actor those of its mean."""
+def actor_tensors(algorithm: OffPolicyAlgorithm | RecurrentTD3) -> Tensors:
+    """Dense layers of the actor, in order; for a stochastic actor those of its mean; and its LSTM."""
     actor: Any = algorithm.actor  # type: ignore[attr-defined]
+    if hasattr(actor, "history"):
+        return _recurrent_tensors(actor)
     parts = [actor.latent_pi, actor.mu] if hasattr(actor, "latent_pi") else [actor.mu]
     layers = [layer for part in parts for layer in part.modules() if isinstance(layer, nn.Linear)]
     tensors: Tensors = {}
@@ -31,9 +38,20 @@ def actor_tensors(algorithm: OffPolicyAlgorithm) -> Tensors:
     return tensors
 
 
+def _recurrent_tensors(actor: RecurrentActor) -> Tensors:
+    parts = {"lstm.input": actor.history.weight_ih_l0.T, "lstm.recurrent": actor.history.weight_hh_l0.T}
+    parts["lstm.bias"] = actor.history.bias_ih_l0 + actor.history.bias_hh_l0
+    parts["present.weight"], parts["present.bias"] = actor.present.weight.T, actor.present.bias
+    for k, layer in enumerate(layer for layer in actor.head if isinstance(layer, nn.Linear)):
+        parts[f"layer.{k}.weight"], parts[f"layer.{k}.bias"] = layer.weight.T, layer.bias
+    return {name: value.detach().contiguous().numpy().copy() for name, value in parts.items()}
+
+
 def actor_card(settings: AgentSettings) -> dict[str, Any]:
     """What a card must say for its weights to be used."""
+    memory = {"memory": settings.memory} if isinstance(settings, RecurrentSettings) else {}
     return {
+        **memory,
         "algorithm": settings.algorithm,
         "layout": settings.layout,
         "hidden": list(settings.hidden),
@@ -43,9 +61,19 @@ def actor_card(settings: AgentSettings) -> dict[str, Any]:
     }
 
 
-def policy_of(tensors: Tensors, settings: AgentSettings, name: str = "training") -> ActorPolicy:
+def policy_of(
+    tensors: Tensors, settings: AgentSettings, name: str = "training"
+) -> ActorPolicy | RecurrentActorPolicy:
     """The policy that these weights would be when shipped."""
     layout = LAYOUTS[settings.layout]
+    if isinstance(settings, RecurrentSettings):
+        reward = settings.algorithm == "td3-lstm-plus"
+        network = RecurrentNetwork.from_tensors(
+            tensors, len(layout.elements) + LATENT_SIZE, settings.memory, settings.hidden, reward
+        )
+        return RecurrentActorPolicy(
+            name, MemoryActor(layout, load_encoder(), network, settings.action_ranges)
+        )
     sizes = (len(layout.elements) + LATENT_SIZE, *settings.hidden, 5)
     network = Perceptron.from_tensors(tensors, sizes)
     return ActorPolicy(name, Actor(layout, load_encoder(), network, settings.action_ranges))

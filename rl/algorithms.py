@@ -11,7 +11,10 @@ from rl.encoding import CURVED, PRINTED
 if TYPE_CHECKING:
     from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
 
-AlgorithmName = Literal["td3", "sac", "ddpg", "tqc"]
+    from rl.td3_lstm import RecurrentTD3
+
+AlgorithmName = Literal["td3", "sac", "ddpg", "tqc", "td3-lstm", "td3-lstm-plus"]
+WITH_MEMORY = ("td3-lstm", "td3-lstm-plus")
 
 
 @dataclass(frozen=True)
@@ -75,6 +78,30 @@ class AgentSettings:
         return _decayed(step, self.exploration_noise, self.final_noise, self.noise_decay)
 
 
+@dataclass(frozen=True)
+class RecurrentSettings(AgentSettings):
+    """Settings of an agent with memory; `batch_size` counts sequences, `hidden` joins the branches.
+
+    Attributes:
+        memory: hidden size of each LSTM.
+        update_every: environment steps for one update, which learns from whole sequences.
+        window: longest sequence of td3-lstm-plus.
+        burn_in: transitions before a window that only fill the memory.
+    """
+
+    algorithm: AlgorithmName = "td3-lstm"
+    hidden: tuple[int, ...] = (256,)
+    learning_rate_decay: tuple[int, int] = (50_000, 150_000)
+    batch_size: int = 100
+    noise_decay: tuple[int, int] = (25_000, 75_000)
+    random_steps: int = 10_000
+    replay_size: int = 200_000
+    memory: int = 128
+    update_every: int = 2
+    window: int = 20
+    burn_in: int = 0
+
+
 def _decayed(step: int, first: float, last: float, span: tuple[int, int]) -> float:
     """Linear from `first` to `last` over the span of steps, constant before and after."""
     begin, end = span
@@ -88,6 +115,8 @@ RECIPES: dict[str, AgentSettings] = {
     "sac": replace(TD3, algorithm="sac", random_steps=5_000, learning_rate_decay=(30_000, 150_000)),
     "ddpg": replace(TD3, algorithm="ddpg"),
     "tqc": replace(TD3, algorithm="tqc", random_steps=5_000, learning_rate_decay=(30_000, 150_000)),
+    "td3-lstm": RecurrentSettings(),
+    "td3-lstm-plus": RecurrentSettings(algorithm="td3-lstm-plus"),
     "td3-paper": AgentSettings(
         layout=PRINTED.name,
         learning_rate=3e-4,
@@ -104,7 +133,20 @@ RECIPES: dict[str, AgentSettings] = {
 paper gives none; the others start from what measurement found."""
 
 
-def make_algorithm(settings: AgentSettings, env: Any, seed: int) -> OffPolicyAlgorithm:
+def make_agent_with_memory(settings: RecurrentSettings, env: Any, seed: int) -> RecurrentTD3:
+    """Make an untrained agent with memory."""
+    from rl.td3_lstm import Hyperparameters, RecurrentTD3
+
+    names = ("memory", "batch_size", "discount", "target_rate", "random_steps", "update_every")
+    names += ("replay_size", "window", "burn_in", "saturation_weight", "prior_weight")
+    chosen = {name: getattr(settings, name) for name in names}
+    hyperparameters = Hyperparameters(
+        plus=settings.algorithm == "td3-lstm-plus", head=settings.hidden, **chosen
+    )
+    return RecurrentTD3(env, hyperparameters, seed, settings.learning_rate_at, settings.noise_at)
+
+
+def make_algorithm(settings: AgentSettings, env: Any, seed: int) -> OffPolicyAlgorithm | RecurrentTD3:
     """Make an untrained algorithm.
 
     Args:
@@ -116,6 +158,8 @@ def make_algorithm(settings: AgentSettings, env: Any, seed: int) -> OffPolicyAlg
         ValueError: unknown algorithm.
         ImportError: `tqc` without sb3-contrib.
     """
+    if isinstance(settings, RecurrentSettings):
+        return make_agent_with_memory(settings, env, seed)
     from stable_baselines3 import DDPG, SAC
 
     from rl.td3 import FastTD3, ScheduledNoise

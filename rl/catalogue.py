@@ -7,16 +7,23 @@ from hda.policies.planned_descent import PlannedDescent
 from hda.policies.zem_zev import FixedGainZemZev
 from hda.registry import PolicyEntry
 from rl.policy import AgentPolicy, AgentSite, shipped
+from rl.recurrent_policy import RecurrentAgentPolicy
 
 _AGENTS = {
     "td3": "the paper's agent without memory: moves the target, the gains and the time to go",
     "sac": "the same agent trained with soft actor-critic",
+    "td3-lstm": "the paper's agent with memory: TD3 with LSTM, Algorithm 3",
+    "td3-lstm-plus": "the same with one masked memory, the last reward in the history, an encoder per role",
     "td3-paper": "the plain recipe: the printed observation vector, TD3 as its authors published it",
 }
 
 
 def _agent(name: str) -> PolicyEntry:
     return PolicyEntry(name, lambda: AgentPolicy(name, shipped(name)), _AGENTS[name])
+
+
+def _agent_with_memory(name: str) -> PolicyEntry:
+    return PolicyEntry(name, lambda: RecurrentAgentPolicy(name, shipped(name)), _AGENTS[name])
 
 
 _ENTRIES = (
@@ -38,6 +45,8 @@ _ENTRIES = (
         ),
     ),
     ("sac", _agent("sac")),
+    ("td3-lstm", _agent_with_memory("td3-lstm")),
+    ("td3-lstm-plus", _agent_with_memory("td3-lstm-plus")),
     ("td3-paper", _agent("td3-paper")),
 )
 

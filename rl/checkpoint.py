@@ -16,20 +16,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import torch
 
-from rl.artefacts import ArtefactError, Tensors, load_artefact, read_card, save_artefact
+from rl.artefacts import Artefact, ArtefactError, Tensors, load_artefact, read_card, save_artefact
+from rl.td3_lstm import RecurrentTD3
 
 if TYPE_CHECKING:
     from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
 
     from rl.env import LunarHDAEnv
 
+    Algorithm = OffPolicyAlgorithm | RecurrentTD3
+
 KIND = "checkpoint"
 _REPLAY = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
 
 
-def save_checkpoint(
-    folder: Path, algorithm: OffPolicyAlgorithm, env: LunarHDAEnv, card: dict[str, Any]
-) -> Path:
+def save_checkpoint(folder: Path, algorithm: Algorithm, env: LunarHDAEnv, card: dict[str, Any]) -> Path:
     """Write a checkpoint and remove older ones.
 
     Args:
@@ -46,6 +47,8 @@ def save_checkpoint(
         "numpy": _numpy_state(),
         "action_space": _jsonable(algorithm.action_space.np_random.bit_generator.state),
     }
+    if isinstance(algorithm, RecurrentTD3):
+        generators["agent"] = _jsonable(algorithm.rng.bit_generator.state)
     counters = {
         "num_timesteps": algorithm.num_timesteps,
         "n_updates": algorithm._n_updates,
@@ -72,7 +75,7 @@ def newest_checkpoint(folder: Path) -> Path | None:
     return None
 
 
-def restore_checkpoint(path: Path, algorithm: OffPolicyAlgorithm, env: LunarHDAEnv) -> dict[str, Any]:
+def restore_checkpoint(path: Path, algorithm: Algorithm, env: LunarHDAEnv) -> dict[str, Any]:
     """Put a fresh algorithm and environment where the checkpoint was taken.
 
     Args:
@@ -87,25 +90,38 @@ def restore_checkpoint(path: Path, algorithm: OffPolicyAlgorithm, env: LunarHDAE
         ArtefactError: the checkpoint is damaged or does not fit the algorithm.
     """
     artefact = load_artefact(path, KIND)
+    try:
+        _restore_run(artefact, algorithm, env)
+    except (AssertionError, IndexError, KeyError, TypeError, ValueError, RuntimeError) as error:
+        raise ArtefactError(f"{path} does not fit this algorithm: {error!r}") from error
+    return artefact.card
+
+
+def _restore_run(artefact: Artefact, algorithm: Algorithm, env: LunarHDAEnv) -> None:
     counters, generators = artefact.card["counters"], artefact.card["generators"]
     algorithm.num_timesteps = counters["num_timesteps"]
     algorithm._n_updates = counters["n_updates"]
     algorithm._episode_num = counters["episode_num"]
     env.continue_study(counters["study_seed"], counters["next_episode"])
+    _begin_episode(algorithm)
+    _restore_networks(algorithm, artefact.tensors)
+    _restore_replay(algorithm, artefact.tensors)
+    algorithm.action_space.np_random.bit_generator.state = generators["action_space"]
+    if isinstance(algorithm, RecurrentTD3):
+        algorithm.rng.bit_generator.state = generators["agent"]
+    name, keys, *rest = generators["numpy"]
+    np.random.set_state((name, np.array(keys, dtype=np.uint32), *rest))  # noqa: NPY002 - SB3 draws from it
+    torch.set_rng_state(torch.from_numpy(artefact.tensors["generator/torch"].copy()))
+
+
+def _begin_episode(algorithm: Algorithm) -> None:
+    if isinstance(algorithm, RecurrentTD3):
+        algorithm.restart_episode()
+        return
     vectorized = algorithm.get_env()
     assert vectorized is not None
     vectorized._reset_seeds()
     algorithm._last_obs = vectorized.reset()  # type: ignore[assignment]
-    try:
-        _restore_networks(algorithm, artefact.tensors)
-        _restore_replay(algorithm, artefact.tensors)
-    except (KeyError, ValueError, RuntimeError) as error:
-        raise ArtefactError(f"{path} does not fit this algorithm: {error}") from error
-    algorithm.action_space.np_random.bit_generator.state = generators["action_space"]
-    name, keys, *rest = generators["numpy"]
-    np.random.set_state((name, np.array(keys, dtype=np.uint32), *rest))  # noqa: NPY002 - SB3 draws from it
-    torch.set_rng_state(torch.from_numpy(artefact.tensors["generator/torch"].copy()))
-    return artefact.card
 
 
 def _numpy_state() -> list[Any]:
@@ -119,7 +135,7 @@ def _jsonable(state: Any) -> Any:
     return state if isinstance(state, str) else int(state)
 
 
-def _network_tensors(algorithm: OffPolicyAlgorithm) -> Tensors:
+def _network_tensors(algorithm: Algorithm) -> Tensors:
     modules, variables = algorithm._get_torch_save_params()
     tensors: Tensors = {}
     for name in modules:
@@ -135,7 +151,7 @@ def _network_tensors(algorithm: OffPolicyAlgorithm) -> Tensors:
     return tensors
 
 
-def _restore_networks(algorithm: OffPolicyAlgorithm, tensors: Tensors) -> None:
+def _restore_networks(algorithm: Algorithm, tensors: Tensors) -> None:
     modules, variables = algorithm._get_torch_save_params()
     for name in modules:
         module = attrgetter(name)(algorithm)
@@ -158,7 +174,9 @@ def _restore_networks(algorithm: OffPolicyAlgorithm, tensors: Tensors) -> None:
         attrgetter(name)(algorithm).data.copy_(torch.tensor(tensors[f"variable/{name}"]))
 
 
-def _replay_tensors(algorithm: OffPolicyAlgorithm) -> Tensors:
+def _replay_tensors(algorithm: Algorithm) -> Tensors:
+    if isinstance(algorithm, RecurrentTD3):
+        return {f"replay/{name}": array for name, array in algorithm.replay_buffer.tensors().items()}
     replay: Any = algorithm.replay_buffer
     size = replay.size()
     tensors: Tensors = {f"replay/{name}": getattr(replay, name)[:size] for name in _REPLAY}
@@ -166,7 +184,11 @@ def _replay_tensors(algorithm: OffPolicyAlgorithm) -> Tensors:
     return tensors
 
 
-def _restore_replay(algorithm: OffPolicyAlgorithm, tensors: Tensors) -> None:
+def _restore_replay(algorithm: Algorithm, tensors: Tensors) -> None:
+    if isinstance(algorithm, RecurrentTD3):
+        kept = {name: tensors[f"replay/{name}"] for name in algorithm.replay_buffer.tensors()}
+        algorithm.replay_buffer.restore(kept)
+        return
     replay: Any = algorithm.replay_buffer
     for name in _REPLAY:
         stored = tensors[f"replay/{name}"]

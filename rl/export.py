@@ -54,9 +54,10 @@ class Candidate:
 
 def settings_from_json(values: dict[str, Any]) -> AgentSettings:
     """Undo `dataclasses.asdict` and JSON on AgentSettings."""
-    from rl.algorithms import AgentSettings
+    from rl.algorithms import WITH_MEMORY, AgentSettings, RecurrentSettings
 
-    return AgentSettings(**{**values, **{k: tuple(v) for k, v in values.items() if isinstance(v, list)}})
+    kind = RecurrentSettings if values.get("algorithm") in WITH_MEMORY else AgentSettings
+    return kind(**{**values, **{k: tuple(v) for k, v in values.items() if isinstance(v, list)}})
 
 
 def training_command(card: dict[str, Any], seed: int) -> str:

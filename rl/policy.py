@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,23 +47,31 @@ class Actor:
         return decide_action(self.act(observation, nominal_target), observation, self.ranges)
 
 
+def read_actor_card(card: dict[str, Any], path: Path) -> tuple[Layout, list[int], ActionRanges]:
+    """Layout, sizes of the hidden layers and action ranges of an actor's card.
+
+    Raises:
+        ArtefactError: it was made for another encoding or autoencoder, or a field is wrong.
+    """
+    require(card, "encoding_version", ENCODING_VERSION, path)
+    require(card, "autoencoder", load_autoencoder().digest, path)
+    if card.get("layout") not in LAYOUTS:
+        raise ArtefactError(f"{path}: unknown layout {card.get('layout')!r}")
+    try:
+        hidden = [int(size) for size in card["hidden"]]
+        ranges = action_ranges_from_card(card["action_ranges"])
+    except (KeyError, TypeError, ValueError) as error:
+        raise ArtefactError(f"{path}: the card's 'hidden' or 'action_ranges' is wrong: {error}") from error
+    return LAYOUTS[card["layout"]], hidden, ranges
+
+
 def actor_from_artefact(artefact: Artefact, path: Path) -> Actor:
     """Make an actor from verified weights.
 
     Raises:
         ArtefactError: they were made for another encoding, another autoencoder, or have other shapes.
     """
-    card = artefact.card
-    require(card, "encoding_version", ENCODING_VERSION, path)
-    require(card, "autoencoder", load_autoencoder().digest, path)
-    if card.get("layout") not in LAYOUTS:
-        raise ArtefactError(f"{path}: unknown layout {card.get('layout')!r}")
-    layout = LAYOUTS[card["layout"]]
-    try:
-        hidden = [int(size) for size in card["hidden"]]
-        ranges = action_ranges_from_card(card["action_ranges"])
-    except (KeyError, TypeError, ValueError) as error:
-        raise ArtefactError(f"{path}: the card's 'hidden' or 'action_ranges' is wrong: {error}") from error
+    layout, hidden, ranges = read_actor_card(artefact.card, path)
     sizes = (len(layout.elements) + LATENT_SIZE, *hidden, 5)
     return Actor(layout, load_encoder(), Perceptron.from_tensors(artefact.tensors, sizes), ranges)
 

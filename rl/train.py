@@ -2,6 +2,7 @@
 
 python -m rl.train autoencoder                        # the map encoder that every agent needs
 python -m rl.train td3 --seed 0 --out runs/td3-0      # an agent; also sac, ddpg, tqc, td3-paper
+python -m rl.train td3-lstm --seed 0 --out runs/m-0   # an agent with memory; also td3-lstm-plus
 python -m rl.train td3 --seed 0 --out runs/td3-0 --resume
 python -m rl.train export --name td3 --runs runs/td3-0 runs/td3-1 runs/td3-2
 """
@@ -15,7 +16,7 @@ from typing import Annotated
 
 import tyro
 
-from rl.algorithms import RECIPES, AgentSettings
+from rl.algorithms import RECIPES, AgentSettings, RecurrentSettings
 from rl.export import ExportWeights, run_export
 from rl.train_autoencoder import TrainAutoencoder, run_autoencoder_training
 
@@ -47,6 +48,19 @@ class TrainAgent:
     checkpoint_every: int = 10_000
 
 
+@dataclass(frozen=True)
+class TrainRecurrentAgent(TrainAgent):
+    """Train an agent with memory (TD3 with LSTM) on the training tiles.
+
+    Attributes:
+        settings: what is learnt.
+        steps: environment steps; one update every `update_every` once the random steps are over.
+    """
+
+    settings: tyro.conf.OmitArgPrefixes[RecurrentSettings]
+    steps: int = 170_000
+
+
 Command = (
     Annotated[TrainAutoencoder, tyro.conf.subcommand("autoencoder")]
     | Annotated[TrainAgent, tyro.conf.subcommand("td3", default=TrainAgent(RECIPES["td3"]))]
@@ -54,6 +68,14 @@ Command = (
     | Annotated[TrainAgent, tyro.conf.subcommand("ddpg", default=TrainAgent(RECIPES["ddpg"]))]
     | Annotated[TrainAgent, tyro.conf.subcommand("tqc", default=TrainAgent(RECIPES["tqc"]))]
     | Annotated[TrainAgent, tyro.conf.subcommand("td3-paper", default=TrainAgent(RECIPES["td3-paper"]))]
+    | Annotated[
+        TrainRecurrentAgent,
+        tyro.conf.subcommand("td3-lstm", default=TrainRecurrentAgent(RECIPES["td3-lstm"])),
+    ]
+    | Annotated[
+        TrainRecurrentAgent,
+        tyro.conf.subcommand("td3-lstm-plus", default=TrainRecurrentAgent(RECIPES["td3-lstm-plus"])),
+    ]
     | Annotated[ExportWeights, tyro.conf.subcommand("export")]
 )
 
