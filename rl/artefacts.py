@@ -1,8 +1,8 @@
 """Weights on disk: numbers as safetensors, everything else as a JSON card beside them. Nothing is unpickled.
 
-A card names the kind of artefact, the versions it was made with and the SHA-256 of every tensor. A file
-that is missing, damaged, foreign or changed after it was written is refused before any number of it is
-used.
+A card names the kind of artefact, the versions it was made with and the SHA-256 of every tensor and of
+itself. A file that is missing, damaged, foreign or changed after it was written is refused before any number
+of it is used.
 """
 
 from __future__ import annotations
@@ -18,7 +18,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
+READABLE_FORMATS = (1, 2)
+"""Cards of format 1 do not hold their own checksum."""
 WEIGHTS_FOLDER = Path(__file__).parent / "weights"
 
 Tensors = dict[str, NDArray[Any]]
@@ -59,6 +61,12 @@ def combined_digest(digests: Mapping[str, str]) -> str:
     return hashlib.sha256(json.dumps(dict(digests), sort_keys=True).encode()).hexdigest()
 
 
+def card_digest(card: Mapping[str, Any]) -> str:
+    """SHA-256 over what a card says, its own checksum aside."""
+    said = {name: value for name, value in card.items() if name != "card_sha256"}
+    return hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()
+
+
 def library_versions() -> dict[str, str]:
     """Versions of what the numbers depend on."""
     from importlib.metadata import version
@@ -86,6 +94,8 @@ def save_artefact(path: Path, kind: str, tensors: Tensors, card: Mapping[str, An
         **card,
         "tensors": {name: tensor_digest(tensor) for name, tensor in arrays.items()},
     }
+    full = json.loads(json.dumps(full))  # as it will be read
+    full["card_sha256"] = card_digest(full)
     _replace(path.with_suffix(".safetensors"), save(arrays))
     _replace(path.with_suffix(".json"), (json.dumps(full, indent=1, sort_keys=True) + "\n").encode())
     return Artefact(kind, arrays, full)
@@ -135,12 +145,14 @@ def read_card(card_path: Path, kind: str) -> dict[str, Any]:
         card = json.loads(card_path.read_text())
     except OSError as error:
         raise ArtefactError(f"cannot read the weight card {card_path}: {error}") from error
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise ArtefactError(f"{card_path} is damaged or not a JSON card: {error}") from error
     if not isinstance(card, dict) or not isinstance(card.get("tensors"), dict):
         raise ArtefactError(f"{card_path} is not a weight card")
-    if card.get("format") != FORMAT_VERSION:
+    if card.get("format") not in READABLE_FORMATS:
         raise ArtefactError(f"{card_path}: format {card.get('format')!r}, expected {FORMAT_VERSION}")
+    if ("card_sha256" in card or card["format"] > 1) and card.get("card_sha256") != card_digest(card):
+        raise ArtefactError(f"{card_path} was changed or damaged: its checksum does not hold")
     if card.get("kind") != kind:
         raise ArtefactError(f"{card_path}: kind {card.get('kind')!r}, expected {kind!r}")
     return card

@@ -100,6 +100,23 @@ def best_of_run(
     return max(found, key=lambda candidate: candidate.score.rank)
 
 
+def validate(
+    candidate: Candidate, preset: Preset, settings: AgentSettings, options: ExportWeights
+) -> dict[str, Any]:
+    """Fly a chosen checkpoint on the validation tiles; give its scores for the card."""
+    from rl.actor_export import policy_of
+    from rl.scoring import score_policy
+
+    policy = policy_of(candidate.tensors, settings, options.name)
+    score = score_policy(policy, preset, "validation", 0, options.validation_episodes)
+    return {
+        "seed": candidate.seed,
+        "step": candidate.step,
+        "tuning": candidate.score.as_dict(),
+        "validation": score.as_dict(),
+    }
+
+
 def run_export(options: ExportWeights) -> None:
     """Run the command.
 
@@ -110,13 +127,12 @@ def run_export(options: ExportWeights) -> None:
 
     from hda.dtm_library import Ground, prepare_tiles
     from hda.presets import find_preset
-    from rl.actor_export import actor_card, policy_of
+    from rl.actor_export import actor_card
     from rl.artefacts import library_versions, save_artefact
-    from rl.scoring import score_policy
-    from rl.training import TUNING_SEED, read_rows
+    from rl.training import TUNING_SEED, read_rows, read_run
 
     console = Console()
-    cards = [_read_run(run) for run in options.runs]
+    cards = [read_run(run) for run in options.runs]
     first = cards[0]
     if any((card["settings"], card["preset"]) != (first["settings"], first["preset"]) for card in cards):
         raise ValueError("runs must have the same settings and preset")
@@ -128,19 +144,9 @@ def run_export(options: ExportWeights) -> None:
         best.append(best_of_run(run, preset, settings, options, card["seed"]))
         console.print(f"{run}: step {best[-1].step}, {best[-1].score.as_dict()}")
     chosen = max(best, key=lambda candidate: candidate.score.rank)
-    seeds = []
-    for candidate in best:
-        policy = policy_of(candidate.tensors, settings, options.name)
-        validation = score_policy(policy, preset, "validation", 0, options.validation_episodes)
-        console.print(f"seed {candidate.seed} on validation: {validation.as_dict()}")
-        seeds.append(
-            {
-                "seed": candidate.seed,
-                "step": candidate.step,
-                "tuning": candidate.score.as_dict(),
-                "validation": validation.as_dict(),
-            }
-        )
+    seeds = [validate(candidate, preset, settings, options) for candidate in best]
+    for scores in seeds:
+        console.print(f"seed {scores['seed']} on validation: {scores['validation']}")
     curve = [
         {"step": int(row["step"]), "safe_site_percent": float(row["safe_site_percent"])}
         for row in read_rows(chosen.run / "validation.csv")
@@ -161,13 +167,3 @@ def run_export(options: ExportWeights) -> None:
     card = {**actor_card(settings), "training": training}
     artefact = save_artefact(options.out / options.name, "actor", chosen.tensors, card)
     console.print(f"wrote {options.out / options.name}.safetensors ({artefact.digest[:12]})")
-
-
-def _read_run(run: Path) -> dict[str, Any]:
-    try:
-        card = json.loads((run / "run.json").read_text())
-    except (OSError, ValueError) as error:
-        raise ValueError(f"{run} is not a run: {error}") from error
-    if not isinstance(card, dict) or not {"settings", "preset", "seed", "plan", "recipe"} <= set(card):
-        raise ValueError(f"{run / 'run.json'} is not the record of a run")
-    return card

@@ -55,7 +55,7 @@ def read_actor_card(card: dict[str, Any], path: Path) -> tuple[Layout, list[int]
     """
     require(card, "encoding_version", ENCODING_VERSION, path)
     require(card, "autoencoder", load_autoencoder().digest, path)
-    if card.get("layout") not in LAYOUTS:
+    if not isinstance(card.get("layout"), str) or card["layout"] not in LAYOUTS:
         raise ArtefactError(f"{path}: unknown layout {card.get('layout')!r}")
     try:
         hidden = [int(size) for size in card["hidden"]]

@@ -243,7 +243,7 @@ def _open_folder(
             raise ValueError(
                 f"{folder} already holds a run: pass --resume to go on with it, or another --out"
             )
-        before = json.loads(card.read_text())
+        before = read_run(folder)
         changed = [name for name, value in asked.items() if before.get(name) != value]
         if changed:
             raise ValueError(
@@ -257,6 +257,21 @@ def _open_folder(
         for name in ("training.csv", "validation.csv"):
             (folder / name).unlink(missing_ok=True)
     return checkpoint
+
+
+def read_run(folder: Path) -> dict[str, Any]:
+    """What a run was begun with, from its `run.json`.
+
+    Raises:
+        ValueError: the folder holds no run, or its record is damaged.
+    """
+    try:
+        card = json.loads((folder / "run.json").read_text())
+    except (OSError, ValueError, RecursionError) as error:
+        raise ValueError(f"{folder} is not a run: {error}") from error
+    if not isinstance(card, dict) or not {"settings", "preset", "seed", "plan", "recipe"} <= set(card):
+        raise ValueError(f"{folder / 'run.json'} is not the record of a run")
+    return card
 
 
 def _empty_window() -> dict[str, list[float]]:
@@ -273,11 +288,26 @@ def _append_row(path: Path, row: Mapping[str, Any]) -> None:
 
 
 def read_rows(path: Path) -> list[dict[str, str]]:
-    """Rows of a log; empty if there is none."""
+    """Rows of a log, all numbers; empty if there is none. A last line that was never finished is left out.
+
+    Raises:
+        ValueError: the log is damaged; the message names the line.
+    """
     if not path.exists():
         return []
-    with path.open(newline="") as file:
-        return list(csv.DictReader(file))
+    rows: list[dict[str, str]] = []
+    try:
+        lines = path.read_text().splitlines(keepends=True)
+        if lines and not lines[-1].endswith("\n"):
+            lines.pop()  # a killed process was writing it
+        for row in csv.DictReader(lines, strict=True):
+            int(row["step"])
+            for value in row.values():
+                float("nan" if value == "" else value)  # no loss yet: left empty
+            rows.append(row)
+    except (KeyError, TypeError, ValueError, csv.Error) as error:
+        raise ValueError(f"{path}, line {len(rows) + 2}: damaged, or not a log ({error!r})") from error
+    return rows
 
 
 def _truncate_rows(path: Path, last_step: int) -> None:

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from rl.artefacts import ArtefactError, load_artefact, save_artefact
+from rl.artefacts import ArtefactError, card_digest, load_artefact, save_artefact
 
 TENSORS = {
     "layer.0.weight": np.arange(12, dtype=np.float32).reshape(3, 4),
@@ -89,7 +89,8 @@ def test_missing_files_are_named(path):
 )
 def test_foreign_cards_are_refused(path, change, message):
     card = path.with_suffix(".json")
-    card.write_text(json.dumps({**json.loads(card.read_text()), **change}))
+    changed = {**json.loads(card.read_text()), **change}
+    card.write_text(json.dumps({**changed, "card_sha256": card_digest(changed)}))
     with pytest.raises(ArtefactError, match=message):
         load_artefact(path, "actor")
 

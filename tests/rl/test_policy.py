@@ -16,7 +16,7 @@ from hda.presets import sample_scenario
 from hda.registry import make_policy
 from rl.actor_export import actor_card
 from rl.algorithms import RECIPES
-from rl.artefacts import ArtefactError, save_artefact
+from rl.artefacts import ArtefactError, card_digest, save_artefact
 from rl.catalogue import entries
 from rl.env import LunarHDAEnv
 from rl.policy import AgentPolicy, AgentSite, load_actor
@@ -100,6 +100,7 @@ def test_fixed_gain_takes_the_agents_sites_and_nothing_else(weights):
         ({"encoding_version": 99}, "encoding_version 99"),
         ({"autoencoder": "0" * 64}, "autoencoder"),
         ({"layout": "square"}, "layout"),
+        ({"layout": ["curved"]}, "layout"),
         ({"hidden": [8, 8]}, "layer 0 must be"),
         ({"hidden": "wide"}, "hidden"),
         ({"action_ranges": {"gain": 3}}, "action_ranges"),
@@ -107,7 +108,8 @@ def test_fixed_gain_takes_the_agents_sites_and_nothing_else(weights):
 )
 def test_weights_of_another_version_are_refused_when_the_policy_begins(weights, change, message):
     card = weights.with_suffix(".json")
-    card.write_text(json.dumps({**json.loads(card.read_text()), **change}))
+    changed = {**json.loads(card.read_text()), **change}
+    card.write_text(json.dumps({**changed, "card_sha256": card_digest(changed)}))
     scenario = sample_scenario("paper", 8, 0, "train")
     with pytest.raises(ArtefactError, match=message):
         fly(AgentPolicy("agent", weights), scenario)
