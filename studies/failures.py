@@ -92,11 +92,18 @@ def find_held_preset(held: dict[str, object]) -> Preset:
     name = str(held["name"])
     if name not in PRESETS:
         raise ValueError(unknown_name("preset", name, PRESETS))
-    if json.loads(json.dumps(asdict(PRESETS[name]), default=str)) != held:
-        raise ValueError(
-            f"the study's preset {name!r} has other numbers than today's: it cannot be flown again"
-        )
+    today = json.loads(json.dumps(asdict(PRESETS[name]), default=str))
+    changed = _changed(held, today)
+    if changed:
+        raise ValueError(f"preset {name!r} has other numbers today, so it cannot fly again: {changed}")
     return PRESETS[name]
+
+
+def _changed(held: object, today: object, name: str = "preset") -> str:
+    """Name of the first number of a held preset that is another today; what is new today does not count."""
+    if isinstance(held, dict) and isinstance(today, dict):
+        return next(filter(None, (_changed(held[key], today.get(key), f"{name}.{key}") for key in held)), "")
+    return "" if held == today else name
 
 
 def describe_failure(failure: Failure) -> str:

@@ -1,0 +1,139 @@
+"""Failed episodes: what a look read is what the sensor gave, and causes follow from it."""
+
+import csv
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hda.episode import EpisodeRecord, fly
+from hda.presets import PRESETS, sample_scenario
+from hda.registry import make_policy
+from hda.scenario import Preset, Range
+from studies.compare import Comparison, compare
+from studies.failure_causes import (
+    Cause,
+    count_safe_cells,
+    explain_failure,
+    find_remedies,
+    last_change,
+    read_pixels,
+)
+from studies.failures import Failures, describe_failure, read_study, show_failures
+from studies.monte_carlo import Study
+
+HARD = PRESETS["hard"]
+
+
+def failures(policy: str, preset: Preset, episodes: int) -> list[EpisodeRecord]:
+    pilot = make_policy(policy)
+    records = [fly(pilot, sample_scenario(preset, 0, k)) for k in range(episodes)]
+    return [record for record in records if not record.outcome.success]
+
+
+@pytest.mark.parametrize("error", [0.0, 30.0])
+def test_read_pixels_are_those_of_the_sensor(error: float) -> None:
+    """Without noise a look shows the true probability where it reads, and nothing elsewhere."""
+    preset = replace(
+        HARD,
+        lidar=replace(HARD.lidar, noise=0.0),
+        rules=replace(HARD.rules, navigation_position_error=error),
+    )
+    record = fly(make_policy("nearest-safe"), sample_scenario(preset, 1, 0))
+    for observation in record.observations:
+        rows, columns, read = read_pixels(record.scenario, observation)
+        shown = np.zeros(read.shape, dtype=np.float32)
+        where = np.nonzero(read)
+        shown[where] = record.scenario.tile.probability[rows[where[0]], columns[where[1]]]
+        assert np.array_equal(shown, observation.safety_map)
+
+
+def test_causes_fit_the_record() -> None:
+    found = failures("single-divert", HARD, 40)
+    assert len(found) >= 5
+    for record in found:
+        failure = explain_failure(record)
+        assert failure.safe_cells_in_reach <= failure.safe_cells_seen
+        site = record.decisions[-1].site
+        if failure.cause is Cause.NONE_SEEN:
+            assert failure.safe_cells_seen == 0
+        if failure.cause is Cause.MISSED:
+            assert record.scenario.tile.is_safe(site)
+        if failure.cause is Cause.MISREAD:
+            assert failure.last_reading >= 0.5
+            assert not record.scenario.tile.is_safe(site)
+        assert failure.cause not in (Cause.TANK_EMPTY, Cause.TIMED_OUT)
+        assert describe_failure(failure).endswith(".")
+
+
+def test_blind_ground_is_none_seen() -> None:
+    """A sensor that looks straight down only sees the ground below it."""
+    blind = replace(HARD, lidar=replace(HARD.lidar, off_nadir_limit=math.radians(0.5)))
+    causes = [explain_failure(record).cause for record in failures("no-divert", blind, 10)]
+    assert Cause.NONE_SEEN in causes
+    assert count_safe_cells(fly(make_policy("no-divert"), sample_scenario(HARD, 0, 0)))[0] > 0
+
+
+def test_a_light_tank_runs_dry() -> None:
+    poor = replace(HARD, start=replace(HARD.start, mass=Range(1165.0, 1165.0)))
+    causes = {explain_failure(record).cause for record in failures("single-divert", poor, 4)}
+    assert causes == {Cause.TANK_EMPTY}
+
+
+def test_an_engine_that_errs_is_remedied_by_an_exact_one() -> None:
+    wild = replace(HARD, rules=replace(HARD.rules, thrust_error=0.6))
+    study = Study(wild, ("nearest-safe",), 12)
+    remedies = [find_remedies(study, "nearest-safe", r) for r in failures("nearest-safe", wild, 12)]
+    assert any("exact engine" in names for names in remedies)
+
+
+def test_a_success_has_no_cause() -> None:
+    record = fly(make_policy("oracle"), sample_scenario("paper", 0, 0))
+    assert record.outcome.success
+    with pytest.raises(ValueError, match="is a success"):
+        explain_failure(record)
+
+
+def test_the_last_change_is_the_decision_that_chose_the_site() -> None:
+    record = fly(make_policy("single-divert"), sample_scenario("hard", 0, 2))
+    index = last_change(record)
+    site = record.decisions[-1].site
+    assert all(np.array_equal(decision.site, site) for decision in record.decisions[index:])
+    assert index == 0 or not np.array_equal(record.decisions[index - 1].site, site)
+
+
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("study")
+    compare(
+        Comparison(
+            episodes=12, policies=("single-divert",), preset="hard", workers=1, out=out, figures=False,
+            report=False, overwrite=True,
+        )
+    )  # fmt: skip
+    return out
+
+
+def test_every_failed_episode_is_shown(flown: Path) -> None:
+    with (flown / "episodes.csv").open() as stream:
+        failed = [int(row["episode"]) for row in csv.DictReader(stream) if row["success"] == "False"]
+    assert read_study(flown)[1] == {"single-divert": failed}
+    explained = show_failures(Failures(flown, most=2))
+    assert [failure.episode for failure in explained["single-divert"]] == failed[:2]
+    folder = flown / "failures"
+    for episode in failed[:2]:
+        assert (folder / f"single-divert-{episode:06d}.png").read_bytes().startswith(b"\x89PNG")
+    text = (folder / "failures.md").read_text()
+    assert f"{len(failed)} failed, the first 2 shown" in text
+    assert len((folder / "failures.csv").read_text().splitlines()) == 3
+
+
+def test_a_wrong_folder_or_policy_is_named(flown: Path, tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="holds no study"):
+        show_failures(Failures(tmp_path))
+    with pytest.raises(ValueError, match="did you mean single-divert"):
+        show_failures(Failures(flown, policies=("singel-divert",)))
+    with pytest.raises(ValueError, match="most must be at least 1"):
+        Failures(flown, most=0)

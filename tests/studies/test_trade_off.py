@@ -1,0 +1,142 @@
+"""The trade-off study: the front, the sweep of the weights, the files."""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import hda
+from hda import registry
+from hda.episode import fly
+from hda.policies.hazard_aware import HazardAwareSite, HazardAwareWeights
+from hda.presets import sample_scenario
+from hda.registry import make_policy
+from studies.point_score import PointScore
+from studies.statistics import Interval
+from studies.trade_off import TradeOff, TradeOffRow, find_front, plan_points, run_trade_off
+from studies.weight_sweep import SWEEP, change_weight, sweep_name, sweep_path
+
+
+@pytest.fixture(autouse=True)
+def forgetful_registry(monkeypatch: pytest.MonkeyPatch) -> None:
+    hda.policy_names()
+    monkeypatch.setattr(registry, "_entries", dict(registry._entries))
+    monkeypatch.setattr(registry, "_paths", {})
+
+
+def row(name: str, safe: float, burnt: float, privileged: bool = False) -> TradeOffRow:
+    ratio = Interval(safe, safe, safe)
+    score = PointScore(100, ratio, ratio, ratio, ratio, Interval(burnt, burnt, burnt))
+    return TradeOffRow("paper", "validation", name, "", float("nan"), privileged, score)
+
+
+@given(st.lists(st.tuples(st.integers(0, 5), st.integers(0, 5), st.booleans()), min_size=1, max_size=12))
+def test_the_front_is_what_nothing_open_beats(places: list[tuple[int, int, bool]]) -> None:
+    rows = [row(f"p{k}", safe / 5.0, float(burnt), seen) for k, (safe, burnt, seen) in enumerate(places)]
+    front = find_front(rows)
+    for k, (safe, burnt, seen) in enumerate(places):
+        beaten = any(
+            not their_seen and s >= safe and b <= burnt and (s > safe or b < burnt)
+            for s, b, their_seen in places
+        )
+        assert (f"p{k}" in front) == (not seen and not beaten)
+
+
+def test_a_weight_at_its_default_flies_as_hazard_aware() -> None:
+    default = HazardAwareWeights().failure_cost
+    scenario = sample_scenario("paper", 5, 0, "tuning")
+    plain = fly(make_policy("hazard-aware"), scenario)
+    same = fly(make_policy(sweep_path("failure_cost", default)), scenario)
+    assert same.policy == sweep_name("failure_cost", default)
+    assert np.array_equal(same.path, plain.path)
+
+
+def test_sweeps_leave_the_default_out() -> None:
+    for weight, values in SWEEP.items():
+        assert getattr(HazardAwareWeights(), weight) not in values
+        for value in values:
+            selection = change_weight(weight, value).site_selection
+            assert isinstance(selection, HazardAwareSite)
+            assert getattr(selection.weights, weight) == value
+
+
+@pytest.mark.parametrize("path", ["failure_csot=3", "failure_cost=-1", "failure_cost=x", "nothing"])
+def test_a_wrong_weight_is_no_policy(path: str) -> None:
+    with pytest.raises(ValueError, match="policy"):
+        make_policy(f"studies.weight_sweep:{path}")
+
+
+@pytest.fixture(scope="module")
+def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    hda.policy_names()
+    kept = dict(registry._entries), dict(registry._paths)
+    folder = tmp_path_factory.mktemp("trade_off")
+    run_trade_off(
+        TradeOff(
+            presets=("paper",),
+            policies=("no-divert", "single-divert", "oracle"),
+            weights=("commit_time",),
+            episodes=10,
+            sweep_episodes=2,
+            workers=1,
+            out=folder,
+        )
+    )
+    registry._entries.clear()
+    registry._entries.update(kept[0])
+    registry._paths.clear()
+    registry._paths.update(kept[1])
+    return folder
+
+
+def test_policies_fly_validation_and_weights_fly_tuning(out: Path) -> None:
+    with (out / "table.csv").open() as stream:
+        lines = list(csv.DictReader(stream))
+    splits = {line["policy"]: line["split"] for line in lines}
+    assert splits == {
+        "no-divert": "validation",
+        "single-divert": "validation",
+        "oracle": "validation",
+        "hazard-aware": "tuning",
+        "hazard-aware.commit_time-0.5": "tuning",
+        "hazard-aware.commit_time-7.5": "tuning",
+    }
+    assert [line["value"] for line in lines if line["weight"] == "commit_time"] == ["0.5", "7.5"]
+    assert not any(line["on_front"] == "True" for line in lines if line["policy"] == "oracle")
+    assert any(line["on_front"] == "True" for line in lines if line["policy"] == "single-divert")
+
+
+def test_no_policy_beats_the_bounds(out: Path) -> None:
+    with (out / "bounds.csv").open() as stream:
+        (bounds,) = csv.DictReader(stream)
+    with (out / "table.csv").open() as stream:
+        flown = [line for line in csv.DictReader(stream) if line["split"] == "validation"]
+    assert all(float(line["success_percent"]) <= float(bounds["ceiling_percent"]) for line in flown)
+    assert all(float(line["propellant_percent"]) >= float(bounds["floor_percent"]) for line in flown)
+
+
+def test_the_picture_is_there(out: Path) -> None:
+    assert (out / "trade-off.png").read_bytes().startswith(b"\x89PNG")
+    assert "| paper | tuning | hazard-aware.commit_time-7.5 |" in (out / "table.md").read_text()
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"episodes": 0}, "episodes must be at least 1"),
+        ({"weights": ("failure_csot",)}, "did you mean failure_cost"),
+        ({"weights": ()}, "weights must name at least one"),
+        ({"presets": ("papper",)}, "did you mean paper"),
+    ],
+)
+def test_a_wrong_option_is_named(options: dict, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        plan_points(TradeOff(**options))
+
+
+def test_without_weights_only_policies_fly() -> None:
+    points = plan_points(TradeOff(weights=("none",)))
+    assert [point.label for point in points] == ["paper/policies", "hard/policies"]
