@@ -4,7 +4,7 @@ A landing on hazardous ground is followed back: was the site itself safe, had a 
 was some of it within reach at that look (the outer bound of `hda.policies.hindsight`, so `out of reach` is
 proved), and what did the last look that read the site say of it? Beside the cause stand the single changes
 that would have made the episode a success: the same episode flown again with a noiseless map, an exact
-engine, or exact navigation.
+engine, or exact navigation. Where no safe ground had been seen such a success is another draw of luck.
 """
 
 from __future__ import annotations

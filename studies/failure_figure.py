@@ -87,5 +87,6 @@ def _draw_look(axis: Axes, record: EpisodeRecord, observation: Observation) -> N
     left = float(record.time[-1]) - observation.time
     axis.set_title(f"look {observation.index}, {left:.1f} s before the end", fontsize="small")
     axis.tick_params(labelsize="x-small")
+    axis.ticklabel_format(useOffset=False)
     if observation.index == record.observations[-1].index:
         axis.legend(loc="upper left", fontsize="x-small", framealpha=0.9)

@@ -112,10 +112,12 @@ def describe_failure(failure: Failure) -> str:
     words += f" {failure.cause.value[0].upper()}{failure.cause.value[1:]}."
     if failure.cause in (Cause.MISREAD, Cause.KNOWN_HAZARD, Cause.BETWEEN_PIXELS):
         words += f" It read {failure.last_reading:.2f}, {failure.last_reading_s:.1f} s before touchdown."
-    words += (
-        f" Looks had shown {failure.safe_cells_seen} safe cells, {failure.safe_cells_in_reach} of them within"
-        f" reach; the site last changed {failure.last_change_s:.1f} s before touchdown."
-    )
+    if failure.safe_cells_seen:
+        words += (
+            f" Looks had shown {failure.safe_cells_seen} safe cells,"
+            f" {failure.safe_cells_in_reach} of them within reach."
+        )
+    words += f" The site last changed {failure.last_change_s:.1f} s before touchdown."
     if failure.remedies:
         words += f" A success with {' or with '.join(failure.remedies)}."
     return words
