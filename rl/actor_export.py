@@ -39,8 +39,9 @@ def actor_tensors(algorithm: OffPolicyAlgorithm | RecurrentTD3) -> Tensors:
 
 
 def _recurrent_tensors(actor: RecurrentActor) -> Tensors:
-    parts = {"lstm.input": actor.history.weight_ih_l0.T, "lstm.recurrent": actor.history.weight_hh_l0.T}
-    parts["lstm.bias"] = actor.history.bias_ih_l0 + actor.history.bias_hh_l0
+    history = dict(actor.history.named_parameters())
+    parts = {"lstm.input": history["weight_ih_l0"].T, "lstm.recurrent": history["weight_hh_l0"].T}
+    parts["lstm.bias"] = history["bias_ih_l0"] + history["bias_hh_l0"]
     parts["present.weight"], parts["present.bias"] = actor.present.weight.T, actor.present.bias
     for k, layer in enumerate(layer for layer in actor.head if isinstance(layer, nn.Linear)):
         parts[f"layer.{k}.weight"], parts[f"layer.{k}.bias"] = layer.weight.T, layer.bias

@@ -122,13 +122,16 @@ def _decayed(step: int, first: float, last: float, span: tuple[int, int]) -> flo
 
 
 TD3 = AgentSettings()
+RECURRENT_RECIPES = {
+    "td3-lstm": RecurrentSettings(),
+    "td3-lstm-plus": RecurrentSettings(algorithm="td3-lstm-plus"),
+}
 RECIPES: dict[str, AgentSettings] = {
     "td3": TD3,
     "sac": replace(TD3, algorithm="sac", random_steps=5_000, learning_rate_decay=(30_000, 150_000)),
     "ddpg": replace(TD3, algorithm="ddpg"),
     "tqc": replace(TD3, algorithm="tqc", random_steps=5_000, learning_rate_decay=(30_000, 150_000)),
-    "td3-lstm": RecurrentSettings(),
-    "td3-lstm-plus": RecurrentSettings(algorithm="td3-lstm-plus"),
+    **RECURRENT_RECIPES,
     "td3-paper": AgentSettings(
         layout=PRINTED.name,
         learning_rate=3e-4,

@@ -62,9 +62,9 @@ class RecurrentActor(nn.Module):
         self, observations: Tensor, history: Tensor, memory: Memory | None = None
     ) -> tuple[Tensor, Memory]:
         """Inputs of the last tanh, (T, N, action), and the memory after the last step."""
-        past, memory = self.history(history, memory)
+        past, after = self.history(history, memory)
         present = torch.relu(self.present(observations))
-        return self.head(torch.cat((past, present), -1)), memory
+        return self.head(torch.cat((past, present), -1)), after
 
 
 class _ValueHead(nn.Module):

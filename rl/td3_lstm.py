@@ -163,7 +163,11 @@ class RecurrentTD3:
         self.rng = np.random.default_rng(seed)
         self.num_timesteps = self._n_updates = self._episode_num = 0
         self.logger: Any = None
-        self._observation: Array | None = None
+        # the episode under way
+        self._seen: list[Array] = []
+        self._actions: list[Array] = []
+        self._rewards: list[float] = []
+        self._memory: AgentMemory | None = None
 
     # Acting
 
@@ -195,10 +199,10 @@ class RecurrentTD3:
         if reward is not None:
             last_reward[:] = reward
         if episode_start is not None:
-            keep = 1.0 - np.broadcast_to(np.asarray(episode_start, np.float32), (n,))
+            keep = np.float32(1.0) - np.broadcast_to(np.asarray(episode_start, np.float32), (n,))
             memory = AgentMemory(*(part * keep[:, None] for part in vars(memory).values()))
-            last_reward = last_reward * keep
-        history = [seen, memory.action.astype(np.float32)]
+            last_reward *= keep
+        history = [seen, memory.action]
         if self.settings.plus:
             history.append(last_reward[:, None])
         with torch.no_grad():
@@ -234,10 +238,9 @@ class RecurrentTD3:
 
     def restart_episode(self) -> None:
         """Begin the next episode of the environment; the first is seeded."""
-        first = self._observation is None and self.num_timesteps == 0
-        self._observation = self.env.reset(seed=self.seed)[0] if first else self.env.reset()[0]
-        self._memory: AgentMemory | None = None
-        self._seen, self._done_actions, self._rewards = [self._observation], [], []
+        first = not self._seen and self.num_timesteps == 0
+        self._seen = [self.env.reset(seed=self.seed)[0] if first else self.env.reset()[0]]
+        self._actions, self._rewards, self._memory = [], [], None
 
     def learn(
         self,
@@ -259,7 +262,7 @@ class RecurrentTD3:
             self.num_timesteps = 0
         if callback is not None:
             callback.init_callback(self)
-        if self._observation is None:
+        if not self._seen:
             self.restart_episode()
         last = self.num_timesteps + total_timesteps
         while self.num_timesteps < last:
@@ -276,28 +279,24 @@ class RecurrentTD3:
         return self
 
     def _step(self) -> tuple[float, bool, dict[str, Any]]:
-        assert self._observation is not None
         reward = self._rewards[-1] if self._rewards else 0.0
         if self.num_timesteps < self.settings.random_steps:
             # a random step needs no memory: updates see whole episodes and fill it anew
             action = self.rng.uniform(-1.0, 1.0, self.action_space.shape[0]).astype(np.float32)
             taken = self._unscaled(action)
-            if self.num_timesteps + 1 == self.settings.random_steps:
-                self._memory = None
         else:
             if self._memory is None and len(self._seen) > 1:
                 self._memory = self._remembered()
-            taken, self._memory = self.predict(self._observation, self._memory, reward=reward)
+            taken, self._memory = self.predict(self._seen[-1], self._memory, reward=reward)
             action = self._memory.action[0]
         observation, reward, terminated, truncated, info = self.env.step(taken)
         self.num_timesteps += 1
-        self._observation = observation
         self._seen.append(observation)
-        self._done_actions.append(action)
+        self._actions.append(action)
         self._rewards.append(float(reward))
         if terminated or truncated:
             self._episode_num += 1
-            parts = (np.array(part, np.float32) for part in (self._seen, self._done_actions, self._rewards))
+            parts = (np.array(part, np.float32) for part in (self._seen, self._actions, self._rewards))
             self.replay_buffer.store(Episode(*parts, terminated=bool(terminated)))
             self.restart_episode()
         return float(reward), bool(terminated or truncated), info
@@ -308,7 +307,7 @@ class RecurrentTD3:
         for k, seen in enumerate(self._seen[:-1]):
             before = self._rewards[k - 1] if k else 0.0
             _, memory = self.predict(seen, memory, deterministic=True, reward=before)
-            memory = AgentMemory(memory.hidden, memory.cell, self._done_actions[k][None])
+            memory = AgentMemory(memory.hidden, memory.cell, self._actions[k][None])
         assert memory is not None
         return memory
 

@@ -16,7 +16,7 @@ from typing import Annotated
 
 import tyro
 
-from rl.algorithms import RECIPES, AgentSettings, RecurrentSettings
+from rl.algorithms import RECIPES, RECURRENT_RECIPES, AgentSettings, RecurrentSettings
 from rl.export import ExportWeights, run_export
 from rl.train_autoencoder import TrainAutoencoder, run_autoencoder_training
 
@@ -70,11 +70,13 @@ Command = (
     | Annotated[TrainAgent, tyro.conf.subcommand("td3-paper", default=TrainAgent(RECIPES["td3-paper"]))]
     | Annotated[
         TrainRecurrentAgent,
-        tyro.conf.subcommand("td3-lstm", default=TrainRecurrentAgent(RECIPES["td3-lstm"])),
+        tyro.conf.subcommand("td3-lstm", default=TrainRecurrentAgent(RECURRENT_RECIPES["td3-lstm"])),
     ]
     | Annotated[
         TrainRecurrentAgent,
-        tyro.conf.subcommand("td3-lstm-plus", default=TrainRecurrentAgent(RECIPES["td3-lstm-plus"])),
+        tyro.conf.subcommand(
+            "td3-lstm-plus", default=TrainRecurrentAgent(RECURRENT_RECIPES["td3-lstm-plus"])
+        ),
     ]
     | Annotated[ExportWeights, tyro.conf.subcommand("export")]
 )
