@@ -76,6 +76,10 @@ def make_footprint(footprint_diameter: float, pad_diameter: float, pixel_size: f
     Raises:
         ValueError: the lander is so small, or its pads so large, that the pads meet in its centre.
     """
+    if pad_diameter >= footprint_diameter:
+        raise ValueError(
+            f"footprint_diameter {footprint_diameter:g} m is too small for pads of {pad_diameter:g} m"
+        )
     outer = math.ceil((footprint_diameter / 2.0 - pixel_size / 2.0) / pixel_size - ROUNDING_GUARD)
     pad_radius = math.ceil(pad_diameter / pixel_size - ROUNDING_GUARD) // 2
     radius = outer - pad_radius

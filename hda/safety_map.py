@@ -52,6 +52,8 @@ class SafetyCriteria:
 
 
 DEFAULT_CRITERIA = SafetyCriteria()
+HIGHEST = 1e9
+"""[m] No ground is higher or deeper: such a number is a no-data value that nobody declared."""
 
 
 @dataclass(frozen=True)
@@ -112,8 +114,19 @@ def assess_safety(
     """
     criteria = SafetyCriteria(footprint_diameter, pad_diameter, max_slope, max_roughness, range_noise)
     pixel_size = finite_number("pixel_size", pixel_size, above=0.0)
+    elevation = elevation_array(dem)
+    side = min(elevation.shape)
+    if criteria.footprint_diameter > (side + 1) * pixel_size:  # before a large footprint is laid out
+        raise ValueError(
+            f"dem must hold the lander, {criteria.footprint_diameter:g} m wide, got {side} cells of"
+            f" {pixel_size:g} m"
+        )
     footprint = make_footprint(criteria.footprint_diameter, criteria.pad_diameter, pixel_size)
-    elevation = _check_dem(dem, footprint)
+    if side < footprint.span:
+        raise ValueError(
+            f"dem must have at least {footprint.span} x {footprint.span} cells to hold the lander, "
+            f"got {elevation.shape[0]} x {elevation.shape[1]}"
+        )
     hole = np.isnan(elevation)
     elevation[hole] = 0.0  # any number: what it touches is marked unknown below
     slope, roughness, excess = _worst_case(elevation, footprint, pixel_size, criteria.max_roughness)
@@ -129,20 +142,30 @@ def assess_safety(
     return SafetyMap(deterministic, probability, slope, roughness)
 
 
-def _check_dem(dem: ArrayLike, footprint: LanderFootprint) -> NDArray[np.float64]:
+def elevation_array(dem: ArrayLike) -> NDArray[np.float64]:
+    """Copy a DEM as float64 [m], shape (m, n); NaN where it is NaN or masked.
+
+    Raises:
+        ValueError: it is not two-dimensional, not of real numbers, or holds heights that no ground has.
+    """
     try:
-        elevation = np.array(dem, dtype=np.float64, order="C")  # a copy: holes are filled in it
+        given = np.asanyarray(dem)
+        if given.dtype.kind not in "biufO":
+            raise TypeError(given.dtype)
+        if isinstance(given, np.ma.MaskedArray):
+            given = np.ma.filled(given.astype(np.float64), np.nan)
+        elevation = np.array(given, dtype=np.float64, order="C")
     except (TypeError, ValueError) as error:
         raise ValueError("dem must be an array of numbers") from error
-    if np.ndim(dem) != 2:
-        raise ValueError(f"dem must be two-dimensional, got shape {np.shape(dem)}")
-    if min(elevation.shape) < footprint.span:
-        raise ValueError(
-            f"dem must have at least {footprint.span} x {footprint.span} cells to hold the lander, "
-            f"got {elevation.shape[0]} x {elevation.shape[1]}"
-        )
+    if elevation.ndim != 2:
+        raise ValueError(f"dem must be two-dimensional, got shape {elevation.shape}")
     if np.isinf(elevation).any():
         raise ValueError("dem must be finite, or NaN where the elevation is unknown; it holds infinities")
+    if (np.abs(elevation) > HIGHEST).any():
+        raise ValueError(
+            f"dem must hold heights within {HIGHEST:g} m, or NaN where the elevation is unknown, got"
+            f" {np.nanmin(elevation):g} to {np.nanmax(elevation):g} m"
+        )
     return elevation
 
 

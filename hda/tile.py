@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from guidance.kernel import compile_kernel
-from hda.safety_map import SafetyCriteria, assess_safety
+from hda.safety_map import SafetyCriteria, assess_safety, elevation_array
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,11 +83,10 @@ def make_tile(
         The tile; the assessment is made on the stored single-precision elevation.
 
     Raises:
-        ValueError: the DEM is not two-dimensional, too small for the lander, or has no finite cell.
+        ValueError: the DEM is not two-dimensional, too small for the lander, has no finite cell, or is not of
+            real heights.
     """
-    heights = np.asarray(dem, dtype=np.float64)
-    if heights.ndim != 2:
-        raise ValueError(f"dem must be two-dimensional, got shape {heights.shape}")
+    heights = elevation_array(dem)
     if not np.isfinite(heights).any():
         raise ValueError("dem must hold at least one finite height")
     elevation = (heights - np.nanmax(heights) + maximum_elevation).astype(np.float32)
