@@ -41,9 +41,9 @@ class AgentSettings:
         prior_weight: of the penalty that draws an actor to the nominal action where the critic sees no
             difference (td3 only; see `rl.td3.FastTD3`).
         smoothing_share: the target actor's actions are smoothed by this share of the exploration noise, at
-            most 0.2; None is 0.2 throughout (td3 only; see `rl.td3.FastTD3`).
-        return_bounds: target values are clipped to them (td3 only); no landing returns more than 1, and no
-            crash from 1000 m less than -20.
+            most 0.2; None is 0.2 throughout (td3 and those with memory; see `rl.td3.FastTD3`).
+        return_bounds: target values are clipped to them (td3 and those with memory); no landing returns more
+            than 1, and no crash from 1000 m less than -20.
         random_steps: steps with uniform actions before the first update.
         replay_size: transitions kept.
         matmul_precision: "highest" is float32; "medium" lets the processor multiply in bfloat16 where it can.
@@ -155,12 +155,13 @@ def make_agent_with_memory(settings: RecurrentSettings, env: Any, seed: int) -> 
     from rl.td3_lstm import Hyperparameters, RecurrentTD3
 
     names = ("memory", "batch_size", "discount", "target_rate", "random_steps", "update_every")
-    names += ("replay_size", "window", "burn_in", "saturation_weight", "prior_weight")
+    names += ("replay_size", "window", "burn_in", "saturation_weight", "prior_weight", "return_bounds")
     chosen = {name: getattr(settings, name) for name in names}
     hyperparameters = Hyperparameters(
         plus=settings.algorithm == "td3-lstm-plus", head=settings.hidden, **chosen
     )
-    return RecurrentTD3(env, hyperparameters, seed, settings.learning_rate_at, settings.noise_at)
+    schedules = (settings.learning_rate_at, settings.noise_at, settings.smoothing_noise_at)
+    return RecurrentTD3(env, hyperparameters, seed, *schedules)
 
 
 def make_algorithm(settings: AgentSettings, env: Any, seed: int) -> OffPolicyAlgorithm | RecurrentTD3:

@@ -22,8 +22,9 @@ Deviations of the printed variant from Algorithm 3 as printed:
 6. The critics' targets use each critic's own history network; the action in front of the first observation is
    zero and not random, since there is none.
 7. The loss as printed trains both critics through one Q; here each has its own error.
-8. The first `random_steps` have uniform actions, the exploration noise and the learning rate may decay, and
-   two penalties (0 switches them off) keep the actor off the ends of its range; see `Hyperparameters`.
+8. The first `random_steps` have uniform actions; exploration noise, target smoothing and learning rate may
+   decay; values may be clipped to what a return can be; and two penalties (0 switches them off) keep the
+   actor off the ends of its range. See `Hyperparameters`.
 9. Truncated episodes keep the value of their last observation; d = 1 only where the task itself ended.
 """
 
@@ -57,8 +58,7 @@ class Hyperparameters:
         batch_size: sequences per update.
         discount: gamma.
         target_rate: tau.
-        target_noise: standard deviation of target smoothing.
-        target_noise_clip: its bound.
+        return_bounds: least and greatest return that an episode can have; target values are clipped to them.
         policy_delay: updates of the critics for one of the actor and the targets.
         random_steps: steps with uniform actions before the first update.
         update_every: environment steps for one update.
@@ -76,8 +76,7 @@ class Hyperparameters:
     batch_size: int = 100
     discount: float = 0.99
     target_rate: float = 0.005
-    target_noise: float = 0.2
-    target_noise_clip: float = 0.5
+    return_bounds: tuple[float, float] | None = None
     policy_delay: int = 2
     random_steps: int = 1_000
     update_every: int = 1
@@ -112,6 +111,7 @@ class RecurrentTD3:
         settings: its hyperparameters.
         learning_rate: of Adam, at an environment step.
         exploration_noise: standard deviation of the noise on actions, at an environment step.
+        smoothing_noise: standard deviation of the noise on the target actor's actions, at one.
         num_timesteps: environment steps so far.
         logger: with `record(name, value)`; None for none.
     """
@@ -123,6 +123,7 @@ class RecurrentTD3:
         seed: int,
         learning_rate: Schedule = lambda step: 1e-3,
         exploration_noise: Schedule = lambda step: 0.1,
+        smoothing_noise: Schedule = lambda step: 0.2,
     ) -> None:
         """Make it untrained.
 
@@ -132,6 +133,8 @@ class RecurrentTD3:
             seed: of weights, exploration, sampling and the environment's first reset.
             learning_rate: of Adam, by environment step.
             exploration_noise: standard deviation on actions in [-1, 1], by environment step.
+            smoothing_noise: standard deviation on the target actor's actions, clipped at 2.5 of it, by
+                environment step.
 
         Raises:
             ValueError: the spaces are not boxes of one dimension.
@@ -142,6 +145,7 @@ class RecurrentTD3:
         self.env, self.settings, self.seed = env, settings, seed
         self.observation_space, self.action_space = env.observation_space, env.action_space
         self.learning_rate, self.exploration_noise = learning_rate, exploration_noise
+        self.smoothing_noise = smoothing_noise
         size = NetworkSizes(
             env.observation_space.shape[0],
             env.action_space.shape[0],
@@ -346,9 +350,8 @@ class RecurrentTD3:
         return loss.item()
 
     def _smoothing_noise(self, shape: torch.Size) -> Tensor:
-        s = self.settings
-        noise = self.rng.standard_normal(tuple(shape), dtype=np.float32) * np.float32(s.target_noise)
-        return torch.from_numpy(noise.clip(-s.target_noise_clip, s.target_noise_clip))
+        noise = self.rng.standard_normal(tuple(shape), dtype=np.float32).clip(-2.5, 2.5)
+        return torch.from_numpy(noise * np.float32(self.smoothing_noise(self.num_timesteps)))
 
     def critic_loss(self, batch: SequenceTensors, noise: Tensor) -> Tensor:
         """Mean square temporal-difference error of both values over the transitions that count.
@@ -362,6 +365,8 @@ class RecurrentTD3:
             actions = (torch.tanh(inputs[1:]) + noise).clamp_(-1.0, 1.0)
             pasts = [past[1:] for past in self.critic_target.remember(batch.history)]
             value = torch.minimum(*self.critic_target.values(pasts, batch.observations[1:], actions))
+            if self.settings.return_bounds is not None:
+                value.clamp_(*self.settings.return_bounds)
             target = batch.rewards + (1.0 - batch.terminated) * self.settings.discount * value
         pasts = self.critic.remember(batch.history[:-1])
         loss = torch.zeros(())
