@@ -67,7 +67,9 @@ def _finish(task: ConvexTask, found: ConvexSolution | None, solves: int, status:
         words = "feasible only with thrust bounds relaxed outward: on the edge of what the lander can do"
         return replace(none, status=PlanStatus.LIMIT_REACHED, message=words)
     if not relaxation_tight(problem, solution):
-        words = "the relaxed optimum breaks min_thrust or the pointing limit: no true flight was found"
+        words = (
+            "the relaxed optimum breaks min_thrust or the pointing limit; method='casadi' may find a flight"
+        )
         return replace(none, status=PlanStatus.LIMIT_REACHED, message=words)
     return Plan.of_flight(status, problem, METHOD, solution.trajectory(problem), solves)
 

@@ -7,23 +7,25 @@ from dataclasses import replace
 import numpy as np
 
 from guidance.certificate import Certificate, FarkasProof
-from guidance.clarabel_solver import SolveStatus
-from guidance.convex import ConstraintSet, ConvexSolution, convex_template
+from guidance.constraint_set import ConstraintSet
+from guidance.convex import ConvexSolution, convex_template
 from guidance.minimum_propellant import ConvexTask
 from guidance.scaling import scale_problem
-from guidance.time_window import time_window
+from guidance.time_window import TimeWindow, time_window
 
 
 def prove_at(task: ConvexTask, time: float) -> FarkasProof | ConvexSolution:
     """Proof that no flight lasts `time`, or the solution that kept it from being found.
 
-    The thrust bounds are relaxed outward. Where the relaxed problem is infeasible the solver's own
-    certificate is the proof. Where it is feasible, but its cheapest flight overdraws the tank, the dual
-    solution y of "propellant >= y-bound" becomes a proof by giving the tank's row the multiplier one.
+    The thrust bounds are relaxed outward. Where the relaxed problem is infeasible the solver's dual vector is
+    the proof, whatever the solver calls it: it may stop for numerical reasons on a good one, and what counts
+    is that our own check verifies it. Where the problem is feasible, but its cheapest flight overdraws the
+    tank, the dual solution y of "propellant >= y-bound" becomes a proof by giving the tank's row the
+    multiplier one.
     """
     cheapest = replace(task, least_error=False, limit_propellant=False, condense=False)
     solution = cheapest.solve(time)
-    if solution.answer.status not in (SolveStatus.SOLVED, SolveStatus.INFEASIBLE):
+    if not np.isfinite(solution.answer.dual).all():
         return solution
     problem, nodes = task.problem, task.nodes
     scaled = scale_problem(problem, time, nodes, None, task.error_limit, limit_propellant=True)
@@ -39,8 +41,16 @@ def prove_at(task: ConvexTask, time: float) -> FarkasProof | ConvexSolution:
     return proof if proof.verified else solution
 
 
+def _closed_form(window: TimeWindow) -> Certificate:
+    scope = f"every time of flight, on any mesh: closed-form bound on {window.cause}"
+    return Certificate(scope, (window.cause,))
+
+
 def prove_fixed_time(task: ConvexTask, time: float) -> Certificate | None:
     """Certificate for one time of flight; None if there is no verified proof."""
+    window = time_window(task.problem, task.free_landing_point)
+    if window.empty:
+        return _closed_form(window)
     proof = prove_at(task, time)
     if not isinstance(proof, FarkasProof):
         return None
@@ -63,8 +73,7 @@ def prove_free_time(task: ConvexTask, also: tuple[float, ...] = ()) -> Certifica
     """
     window = time_window(task.problem, task.free_landing_point)
     if window.empty:
-        scope = f"every time of flight, on any mesh: closed-form bound on {window.cause}"
-        return Certificate(scope, (window.cause,))
+        return _closed_form(window)
     proofs = []
     times = np.union1d(window.grid(), np.array(also))
     for time in times:

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from guidance.clarabel_solver import SolveStatus
 from guidance.condensed import keeps_altitude
-from guidance.convex import ConstraintSet, ConvexSolution, convex_template
+from guidance.constraint_set import ConstraintSet
+from guidance.convex import ConvexSolution, convex_template
 from guidance.flight_time import TimeModel, TimeSearch
 from guidance.primer_vector import find_primer_flight
 from guidance.problem import LandingProblem

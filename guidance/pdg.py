@@ -155,7 +155,7 @@ def _without_flight(plan: Plan, nodes: int, time_of_flight: float | None, unreac
     proof = prove_infeasible(problem, nodes, time_of_flight, anywhere)
     if isinstance(proof, Certificate):
         limits = ", ".join(proof.causes)
-        told = plan.message.startswith("propellant")
+        told = plan.message.startswith("propellant") or plan.message == limits
         message = plan.message if told else f"{plan.message} (limits: {limits})"
         return replace(plan, status=PlanStatus.INFEASIBLE, certificate=proof, message=message)
     if plan.method == "convex" and proof is not None and time_of_flight is None and not anywhere:

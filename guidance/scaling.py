@@ -8,6 +8,7 @@ same numbers at every solve. In raw SI the solver says "Solved" and is a percent
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -159,6 +160,7 @@ def scale_problem(
         bounds = outer_mass_bounds(problem, time, kappa, nodes)
     else:
         bounds = tangent_mass_bounds(problem, log_mass, kappa)
+    loose = max(_LOOSE, math.exp(problem.log_mass_ratio))  # full thrust on the dry mass burns no more
     limit = lander.pointing_limit
     speed = problem.speed_limit
     return ScaledProblem(
@@ -170,7 +172,7 @@ def scale_problem(
         velocity=problem.state.velocity / (acceleration * time),
         gravity=problem.gravity / acceleration,
         mass_bounds=bounds,
-        propellant=problem.log_mass_ratio / kappa if limit_propellant else _LOOSE,
+        propellant=min(problem.log_mass_ratio / kappa, loose) if limit_propellant else loose,
         pointing_cosine=-1.0 if limit is None else float(np.cos(limit)),
         glide_angle=np.pi / 2 if problem.glide_slope_limit is None else problem.glide_slope_limit,
         speed_limit=0.0 if speed is None else speed / (acceleration * time),

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from guidance.problem import LandingProblem
 
 Array = NDArray[np.float64]
+_ROUNDING = 1e-6  # relative: a start on the edge of a limit keeps it
 
 
 @dataclass(frozen=True)
@@ -89,6 +90,18 @@ def _hull(polynomials: list[Array], low: float, high: float) -> tuple[float, flo
     return float(edges[good[0]]), float(edges[good[-1] + 1])
 
 
+def _broken_at_start(problem: LandingProblem, free_landing_point: bool) -> str:
+    """The limit that the start itself breaks by more than rounding; empty if none."""
+    speed = float(np.linalg.norm(problem.state.velocity))
+    if problem.speed_limit is not None and speed > problem.speed_limit * (1.0 + _ROUNDING):
+        return "speed"
+    if problem.glide_slope_limit is None or not problem.has_glide_slope or free_landing_point:
+        return ""
+    across, height = float(np.linalg.norm(problem.offset[:2])), float(problem.offset[2])
+    outside = math.cos(problem.glide_slope_limit) * across - math.sin(problem.glide_slope_limit) * height
+    return "glide slope" if outside > _ROUNDING * (across + height) else ""
+
+
 def time_window(problem: LandingProblem, free_landing_point: bool = False) -> TimeWindow:
     """Closed-form bounds on the time of flight.
 
@@ -102,6 +115,9 @@ def time_window(problem: LandingProblem, free_landing_point: bool = False) -> Ti
     Returns:
         The window; empty, with its cause, where these bounds already forbid every flight.
     """
+    broken = _broken_at_start(problem, free_landing_point)
+    if broken:
+        return TimeWindow(math.inf, -math.inf, broken)
     lander, state = problem.lander, problem.state
     push = lander.max_thrust / lander.dry_mass
     supply = lander.exhaust_velocity * problem.log_mass_ratio

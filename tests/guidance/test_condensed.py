@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from guidance import PAPER_LANDER, State, constraints
 from guidance.clarabel_solver import SolveStatus
 from guidance.condensed import CondensedLayout, burnt_mass, expand, keeps_altitude, landing_moments
-from guidance.convex import ConstraintSet, convex_template
+from guidance.constraint_set import ConstraintSet
+from guidance.convex import convex_template
 from guidance.layout import Layout
 from guidance.minimum_propellant import ConvexTask
 from guidance.problem import LandingProblem

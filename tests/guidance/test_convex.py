@@ -9,7 +9,8 @@ from descents import CASES, FEASIBLE, TARGET, paper_start, problem_of
 
 from guidance import PAPER_LANDER, Lander, State, constraints
 from guidance.constants import MOON_GRAVITY
-from guidance.convex import ConstraintSet, ConvexTemplate
+from guidance.constraint_set import ConstraintSet
+from guidance.convex import ConvexTemplate
 from guidance.minimum_propellant import ConvexTask
 from guidance.problem import LandingProblem
 from guidance.scaling import scale_problem

@@ -79,6 +79,52 @@ def test_infeasible_beyond_closed_form_bounds_by_every_method(method):
 
 
 @pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("time_of_flight", [None, 29.0])
+@pytest.mark.parametrize(
+    ("limits", "cause"), [({"glide_slope_limit": 0.2}, "glide slope"), ({"speed_limit": 29.0}, "speed")]
+)
+def test_a_start_that_breaks_a_limit_is_infeasible_without_a_solve(limits, cause, time_of_flight, method):
+    plan = guidance.solve_pdg(
+        START, TARGET, method=method, time_of_flight=time_of_flight, nodes=21, throw=False, **limits
+    )
+    assert plan.status is PlanStatus.INFEASIBLE
+    assert plan.certificate is not None
+    assert plan.certificate.causes == (cause,)
+    assert not plan.certificate.proofs
+
+
+def test_a_start_on_the_edge_of_its_limits_can_fly():
+    """Radius 300 m at 300 m: on the cone of 45 degrees, moving inward at the very limit of speed."""
+    plan = guidance.solve_pdg(
+        [300, 0, 350, -12, 0, -5, 1200], TARGET, glide_slope_limit=math.pi / 4, speed_limit=13.0
+    )
+    check_flight(plan)
+
+
+# found by a sweep over random vehicles, limits and gravities
+NO_SOLVER_CERTIFICATE = (
+    [-34.3, 36.7, 205.5, -3.1, 5.6, -16.4, 1233.466],
+    Lander(max_thrust=3077.663, specific_impulse=388.5878, min_thrust=307.766, pointing_limit=2.2),
+    {"gravity": (0, 0, -1.62), "glide_slope_limit": 0.35},
+)
+TANK_BEYOND_WHAT_THE_ENGINE_BURNS = (
+    [1.0, -0.4, 14.3, 0.6, 0.6, -4.5, 1657.875],
+    Lander(1505.0, 1573.871, 283.847, min_thrust=944.3227, pointing_limit=1.0),
+    {"gravity": (0, 0, -0.3), "glide_slope_limit": 1.2},
+)
+
+
+@pytest.mark.parametrize("case", [NO_SOLVER_CERTIFICATE, TANK_BEYOND_WHAT_THE_ENGINE_BURNS])
+def test_infeasible_where_the_solver_gives_no_or_a_loose_certificate(case):
+    start, lander, options = case
+    plan = guidance.solve_pdg(start, [0, 0, 0], lander=lander, throw=False, **options)
+    assert plan.status is PlanStatus.INFEASIBLE
+    assert plan.certificate is not None
+    assert len(plan.certificate.proofs) == 24
+    assert plan.certificate.verified
+
+
+@pytest.mark.parametrize("method", METHODS)
 def test_fixed_time_by_every_method(method):
     plan = guidance.solve_pdg(START, TARGET, time_of_flight=29.0, nodes=41, method=method)
     assert plan.time_of_flight == pytest.approx(29.0)
