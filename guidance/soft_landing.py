@@ -178,7 +178,7 @@ def plan_soft_landing(
         plan = approach.cheapest(periods - options.terminal_periods, speed, control_period)
         if plan is None:
             return SoftLanding(PlanStatus.LIMIT_REACHED, None, None)
-        return SoftLanding(PlanStatus.OPTIMAL, _sample(plan, speed, control_period, options), plan)
+        return SoftLanding(PlanStatus.OPTIMAL, sample_descent(plan, speed, control_period, options), plan)
     search = approach.solve(None)
     if search is None:
         raise ValueError(f"state: altitude {state.position[2]:g} m lies below the gate, {gate[2]:g} m")
@@ -187,16 +187,16 @@ def plan_soft_landing(
     if search.status is PlanStatus.OPTIMAL:
         plan = approach.cheapest(math.floor(search.time_of_flight / control_period), speed, control_period)
         if plan is not None:
-            return SoftLanding(PlanStatus.OPTIMAL, _sample(plan, speed, control_period, options), plan)
+            return SoftLanding(PlanStatus.OPTIMAL, sample_descent(plan, speed, control_period, options), plan)
     flight_time = control_period * math.ceil(search.time_of_flight / control_period - 1e-9)
     for sinking in (speed, 0.0):
         plan = approach.solve(flight_time, sinking)
         if plan is not None and plan.landing_error <= search.landing_error + _LANDING_ERROR_SLACK:
-            return SoftLanding(search.status, _sample(plan, sinking, control_period, options), plan)
+            return SoftLanding(search.status, sample_descent(plan, sinking, control_period, options), plan)
     return SoftLanding(PlanStatus.LIMIT_REACHED, None, search)
 
 
-def _sample(
+def sample_descent(
     plan: Plan, sinking: float, control_period: float, options: SoftLandingOptions
 ) -> TrackingReference:
     """Sample the way to the gate, and the terminal phase from it to the ground, at the control instants.

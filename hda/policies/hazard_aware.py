@@ -268,6 +268,14 @@ def price_sites(
     return out
 
 
+def fuse_look(observation: Observation, view: ScenarioView, belief: SafetyBelief | None) -> SafetyBelief:
+    """The belief after a look; the first look fixes the square."""
+    if belief is None:
+        half_side = math.ceil(_SQUARE * observation.width / _LATTICE) * _LATTICE
+        belief = SafetyBelief.blank(observation.target, half_side)
+    return belief.fused(observation, view.lidar)
+
+
 @dataclass(frozen=True)
 class HazardAwareSite:
     """Site selection by the least J.
@@ -292,12 +300,8 @@ class HazardAwareSite:
     def select(self, observation: Observation, memory: HazardAwareMemory) -> tuple[Array, HazardAwareMemory]:
         """Fuse the look, price every cell, and move if another gains enough."""
         view = memory.view
-        belief = memory.belief
-        first = belief is None
-        if belief is None:
-            half_side = math.ceil(_SQUARE * observation.width / _LATTICE) * _LATTICE
-            belief = SafetyBelief.blank(observation.target, half_side)
-        belief = belief.fused(observation, view.lidar)
+        first = memory.belief is None
+        belief = fuse_look(observation, view, memory.belief)
         memory = HazardAwareMemory(view, belief)
         height = float(observation.state.position[2] - observation.target[2])
         if height <= 0.0 or (not first and observation.time_to_go <= self.weights.commit_time):

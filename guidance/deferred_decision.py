@@ -1,0 +1,328 @@
+"""Deferred-decision trajectory optimisation: one trunk, and a branch from it to each candidate site.
+
+The branches share the first nodes of the flight: state, mass and thrust are the same variables there. Each
+candidate may cost no more than its own cheapest flight of the same time and a budget. The longest trunk that
+this allows keeps every candidate open for as long as possible; of the flights that have it, the one of least
+expected propellant is given. More shared nodes are more constraints, so the longest trunk is found by
+bisection, one second-order cone programme a step.
+
+Source: Elango, Sarsilmaz and Acikmese, "Deferred-decision trajectory optimization", 2025; Hayner, Buckner et
+al., "HALO: hazard-aware landing optimization for autonomous systems", ICRA 2023.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from guidance import constraints
+from guidance.clarabel_solver import ConicSolver, SolveStatus
+from guidance.constraints import Rows
+from guidance.convex import ConstraintSet, ConvexSolution, _cones, _nominal_numbers
+from guidance.layout import Layout
+from guidance.minimum_propellant import ConvexTask, bounds_hold
+from guidance.plan import Plan, PlanStatus
+from guidance.problem import LandingProblem
+from guidance.scaling import ScaledProblem, scale_problem
+from guidance.validation import finite_number, finite_vector
+
+Array = NDArray[np.float64]
+METHOD = "deferred decision"
+_MOST_REFINEMENTS = 4
+_LEAST_WEIGHT = 1e-2  # in the expected propellant, so that no branch is left without a price
+_SLACK = 1e-7  # in ln(mass), on each budget: rounding of the solver
+
+
+@dataclass(frozen=True, eq=False)
+class DeferredDecision:
+    """A trunk with a branch to each candidate.
+
+    Attributes:
+        plans: one for each candidate, in order; equal up to node `shared_nodes` - 1. Empty where the
+            candidates cannot all be reached in the time.
+        shared_nodes: nodes of the trunk; 0 where the flights have nothing in common but the start.
+        unreachable: numbers of the candidates that cannot be reached in the time, alone.
+        solves: conic programmes solved.
+    """
+
+    plans: tuple[Plan, ...]
+    shared_nodes: int
+    unreachable: tuple[int, ...]
+    solves: int
+
+    @property
+    def parting_time(self) -> float:
+        """[s] time at which the branches part; 0 without a trunk."""
+        return float(self.plans[0].time[self.shared_nodes - 1]) if self.shared_nodes else 0.0
+
+
+@dataclass(frozen=True)
+class Branching:
+    """What decides the sparsity of the programme.
+
+    Attributes:
+        constraint_set: of each branch.
+        branches: number of candidates.
+        shared_nodes: nodes of the trunk.
+    """
+
+    constraint_set: ConstraintSet
+    branches: int
+    shared_nodes: int
+
+    @property
+    def layout(self) -> Layout:
+        """Of one branch alone, trunk included."""
+        return Layout(self.constraint_set.nodes)
+
+    @cached_property
+    def columns(self) -> NDArray[np.int64]:
+        """Shape (branches, n): where each number of a branch's own layout stands in the decision vector."""
+        size = self.layout.size
+        shared = size // self.constraint_set.nodes * self.shared_nodes
+        own = size - shared
+        out = np.tile(np.arange(size), (self.branches, 1))
+        for branch in range(1, self.branches):
+            out[branch, shared:] = size + (branch - 1) * own + np.arange(own)
+        return out
+
+    @property
+    def size(self) -> int:
+        """Length of the decision vector."""
+        return int(self.columns[-1, -1]) + 1
+
+    def rows(self, scaled: Sequence[ScaledProblem]) -> list[Rows]:
+        """Constraint rows of all branches; those of the trunk alone are stated once.
+
+        Args:
+            scaled: numbers of each branch in equal units, each with its own target as origin.
+        """
+        origin = scaled[0].position
+        parts = []
+        for branch, numbers in enumerate(scaled):
+            aim = origin - numbers.position  # this target as seen from the first
+            shared = replace(numbers, position=origin)
+            for family in self.constraint_set.families:
+                part = family(self.layout, shared)
+                if family is constraints.landing:
+                    part = replace(part, bound=np.concatenate([aim, np.zeros(3)]))
+                moved = self._moved(part, branch)
+                if moved is not None:
+                    parts.append(moved)
+        return parts
+
+    def _moved(self, part: Rows, branch: int) -> Rows | None:
+        """Rows in the columns of a branch, without the cones that bind the trunk only."""
+        column = self.columns[branch][part.column]
+        if branch == 0:
+            return replace(part, column=column)
+        width = part.cone_size if part.cone == "second_order" else 1
+        kept = np.zeros(part.bound.size // width, dtype=np.bool_)
+        kept[part.row[column >= self.layout.size] // width] = True
+        rows = np.repeat(kept, width)
+        if not rows.any():
+            return None
+        number = np.cumsum(rows) - 1
+        entries = rows[part.row]
+        return Rows(
+            part.name,
+            part.cone,
+            part.cone_size if part.cone == "second_order" else int(rows.sum()),
+            number[part.row[entries]],
+            column[entries],
+            part.value[entries],
+            part.bound[rows],
+        )
+
+
+class BranchedProgramme:
+    """The assembled programme of one Branching."""
+
+    def __init__(self, branching: Branching, tolerance: float = 1e-8) -> None:
+        """Fix sparsity and scaling from nominal numbers that no caller can change."""
+        from scipy.sparse import csc_matrix
+
+        self.branching = branching
+        rows = branching.rows([_nominal_numbers(branching.constraint_set.nodes)] * branching.branches)
+        first = np.cumsum([0] + [part.bound.size for part in rows])
+        row = np.concatenate([part.row + offset for part, offset in zip(rows, first, strict=False)])
+        column = np.concatenate([part.column for part in rows])
+        self._order = np.lexsort((row, column))
+        pointer = np.concatenate([[0], np.cumsum(np.bincount(column, minlength=branching.size))])
+        values, bound = self._numbers(rows)
+        shape = (int(first[-1]), branching.size)
+        matrix = csc_matrix((values, row[self._order], pointer), shape=shape)
+        weights = np.full(branching.branches, 1.0 / branching.branches)
+        self._solver = ConicSolver(matrix, bound, self._cost(weights), _cones(rows), tolerance, True)
+
+    def _numbers(self, rows: list[Rows]) -> tuple[Array, Array]:
+        values = np.concatenate([part.value for part in rows])
+        return values[self._order], np.concatenate([part.bound for part in rows])
+
+    def _cost(self, weights: Array) -> Array:
+        cost = np.zeros(self.branching.size)
+        cost[self.branching.columns[:, self.branching.layout.log_mass[-1]]] = -weights
+        return cost
+
+    def solve(self, scaled: Sequence[ScaledProblem], weights: Array) -> list[ConvexSolution] | None:
+        """Least weighted propellant; each branch as a solution of its own, or None if there is none."""
+        rows = self.branching.rows(scaled)
+        answer = self._solver.solve(*self._numbers(rows), self._cost(weights))
+        if answer.status is not SolveStatus.SOLVED:
+            return None
+        layout = self.branching.layout
+        return [
+            ConvexSolution(
+                replace(answer, primal=answer.primal[columns]),
+                layout,
+                scaled[0],
+                rows,
+                -float(scaled[0].kappa * answer.primal[columns[layout.log_mass[-1]]]),
+                np.nan,
+            )
+            for columns in self.branching.columns
+        ]
+
+
+class _ProgrammeCache(threading.local):
+    """Programmes of one thread: a solver object must not be shared while it solves."""
+
+    def __init__(self) -> None:
+        self.programmes: dict[Branching, BranchedProgramme] = {}
+
+
+_CACHE = _ProgrammeCache()
+
+
+def _programme(branching: Branching) -> BranchedProgramme:
+    if branching not in _CACHE.programmes:
+        _CACHE.programmes[branching] = BranchedProgramme(branching)
+    return _CACHE.programmes[branching]
+
+
+@dataclass(frozen=True, eq=False)
+class _Question:
+    """One call: the candidates' problems, their numbers with the budgets, and their weights."""
+
+    problems: list[LandingProblem]
+    time: float
+    nodes: int
+    limits: list[float]
+    weights: Array
+
+    def solve(self, shared_nodes: int, log_mass: list[Array]) -> list[ConvexSolution] | None:
+        """Branches that share some nodes; thrust bounds linearised at the log-masses."""
+        scaled = []
+        for problem, limit, history in zip(self.problems, self.limits, log_mass, strict=True):
+            numbers = scale_problem(problem, self.time, self.nodes, history)
+            scaled.append(replace(numbers, propellant=limit / numbers.kappa))
+        chosen = ConstraintSet.of(self.problems[0], self.nodes)
+        return _programme(Branching(chosen, len(self.problems), shared_nodes)).solve(scaled, self.weights)
+
+    def refine(
+        self, shared_nodes: int, solutions: list[ConvexSolution], log_mass: list[Array]
+    ) -> tuple[list[ConvexSolution] | None, int]:
+        """Linearise anew until the true thrust bounds hold on every branch; how many solves it took."""
+        for solves in range(_MOST_REFINEMENTS):
+            pairs = zip(self.problems, solutions, log_mass, strict=True)
+            if all(bounds_hold(problem, solution, history) for problem, solution, history in pairs):
+                return solutions, solves
+            log_mass = [solution.log_mass for solution in solutions]
+            found = self.solve(shared_nodes, log_mass)
+            if found is None:
+                return None, solves + 1
+            solutions = found
+        return None, _MOST_REFINEMENTS
+
+
+def plan_deferred(
+    problem: LandingProblem,
+    targets: ArrayLike,
+    budget: float,
+    time_of_flight: float,
+    nodes: int = 21,
+    weights: ArrayLike | None = None,
+) -> DeferredDecision:
+    """Keep every candidate open for as long as a budget of propellant allows.
+
+    Args:
+        problem: the landing problem; of its target only the altitude counts.
+        targets: [m] shape (k, 3), the candidates, all at the altitude of the problem's target.
+        budget: [kg] by which each branch may exceed that candidate's cheapest flight of the same time.
+        time_of_flight: [s] of every branch.
+        nodes: N of every branch, trunk included.
+        weights: shape (k,), chance that each candidate will be the one; None for equal chances.
+
+    Returns:
+        The trunk and its branches.
+
+    Raises:
+        ValueError: an argument is out of range or of the wrong shape.
+    """
+    sites = np.atleast_2d(np.asarray(targets, dtype=np.float64))
+    if sites.ndim != 2 or sites.shape[1] != 3 or not np.isfinite(sites).all():
+        raise ValueError(f"targets must be finite, of shape (k, 3), got shape {sites.shape}")
+    if np.abs(sites[:, 2] - problem.target[2]).max() > 1e-6:
+        raise ValueError("targets must lie at the altitude of the problem's target")
+    finite_number("budget", budget, at_least=0.0)
+    finite_number("time_of_flight", time_of_flight, above=0.0)
+    finite_number("nodes", nodes, at_least=3)
+    chances = np.ones(len(sites)) if weights is None else finite_vector("weights", weights, len(sites))
+    if (chances < 0.0).any() or not chances.any():
+        raise ValueError("weights must not be negative, and not all zero")
+    chances = np.maximum(chances / chances.sum(), _LEAST_WEIGHT)
+    problems = [replace(problem, target=site) for site in sites]
+    alone, solves = _cheapest_alone(problems, time_of_flight, nodes)
+    missing = tuple(k for k, solution in enumerate(alone) if not solution.solved)
+    if missing:
+        return DeferredDecision((), 0, missing, solves)
+    extra = -np.log1p(-budget / problem.state.mass)
+    limits = [min(part.propellant_share + extra, problem.log_mass_ratio) + _SLACK for part in alone]
+    question = _Question(problems, time_of_flight, nodes, limits, chances / chances.sum())
+    shared, flights, more = _longest_trunk(question, alone)
+    plans = tuple(
+        Plan.of_flight(
+            PlanStatus.OPTIMAL, own, METHOD, flight.trajectory(problems[0] if shared else own), solves + more
+        )
+        for own, flight in zip(problems, flights, strict=True)
+    )
+    return DeferredDecision(plans, shared, (), solves + more)
+
+
+def _cheapest_alone(
+    problems: list[LandingProblem], time: float, nodes: int
+) -> tuple[list[ConvexSolution], int]:
+    """Each candidate's own cheapest flight with the propellant on board, with the true thrust bounds."""
+    out, solves = [], 0
+    for problem in problems:
+        task = ConvexTask(problem, nodes)
+        solution, more = task.refine(task.solve(time))
+        solves += 1 + more
+        if solution.solved and solution.propellant_share > problem.log_mass_ratio + _SLACK:
+            solution = replace(solution, answer=replace(solution.answer, status=SolveStatus.INFEASIBLE))
+        out.append(solution)
+    return out, solves
+
+
+def _longest_trunk(question: _Question, alone: list[ConvexSolution]) -> tuple[int, list[ConvexSolution], int]:
+    """Most nodes that can be shared, the flights that share them, and the solves it took."""
+    log_mass = [solution.log_mass for solution in alone]
+    best, flights, solves = 0, alone, 0
+    low, high = 0, question.nodes if len(alone) == 1 else question.nodes - 1
+    while low < high:
+        middle = (low + high + 1) // 2
+        found = question.solve(middle, log_mass)
+        solves += 1
+        if found is not None:
+            found, more = question.refine(middle, found, log_mass)
+            solves += more
+        if found is None:
+            high = middle - 1
+        else:
+            low, best, flights = middle, middle, found
+    return best, flights, solves

@@ -1,0 +1,244 @@
+"""Deferred decision: keep several candidate sites open on one trunk, and commit when its branches part.
+
+The peer from the literature (Elango et al., 2025; HALO, Hayner, Buckner et al., 2023). The belief ranks the
+candidates. While the longest trunk that the budget allows reaches the next look, it is flown; when it does
+not, the best candidate is committed to, and left only if a later look shows it to be unsafe.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from guidance.deferred_decision import DeferredDecision, plan_deferred
+from guidance.plan import PlanStatus
+from guidance.soft_landing import SoftLanding, plan_soft_landing, sample_descent
+from guidance.tracking import TrackingReference, tracking_gains
+from guidance.validation import finite_number
+from hda.belief import SafetyBelief
+from hda.observation import Observation, ScenarioView
+from hda.policies.adjusted_descent import AdjustedDescent
+from hda.policies.hazard_aware import HazardAwareSite, HazardAwareWeights, fuse_look, landing_probability
+from hda.policies.planned_descent import DescentMemory
+from hda.policy import Decision, DecisionStatus, PlanCommand
+from hda.surroundings import infer_unseen
+
+Array = NDArray[np.float64]
+
+_NEVER = 1e9  # [s] no later look counts in the ranking
+
+
+@dataclass(frozen=True)
+class DeferredDecisionOptions:
+    """How candidates are chosen and kept open; tuned on the tuning tiles.
+
+    Attributes:
+        candidates: most sites that are kept open.
+        separation: [m] least distance between two of them, along one axis at least.
+        budget: [kg] by which each branch may exceed its candidate's cheapest flight.
+        failure_cost: [kg] of propellant that a failed landing is worth, in the ranking.
+        dispersion: [m] standard deviation of the touchdown about the site, along each axis.
+        switch_gain: [kg] by which another site must be better than the present one to come first.
+        keep_probability: a site committed to is kept while a landing there is at least this likely to be
+            safe.
+        commit_time: [s] with less time to go than this the site is kept whatever is seen.
+        nodes: of each branch.
+    """
+
+    candidates: int = 3
+    separation: float = 15.0
+    budget: float = 0.5
+    failure_cost: float = 200.0
+    dispersion: float = 0.3
+    switch_gain: float = 0.05
+    keep_probability: float = 0.9
+    commit_time: float = 2.5
+    nodes: int = 21
+
+    def __post_init__(self) -> None:
+        """Refuse options that mean nothing."""
+        finite_number("candidates", self.candidates, at_least=1)
+        finite_number("nodes", self.nodes, at_least=3)
+        finite_number("keep_probability", self.keep_probability, at_least=0.0, at_most=1.0)
+        for name in ("separation", "budget", "failure_cost", "switch_gain", "commit_time"):
+            finite_number(name, getattr(self, name), at_least=0.0)
+        finite_number("dispersion", self.dispersion, above=0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class DeferredDecisionMemory:
+    """What the policy remembers between looks.
+
+    Attributes:
+        view: the scenario.
+        descent: memory of the guidance law.
+        belief: from all looks so far; None before the first.
+        committed: whether the branches have parted.
+    """
+
+    view: ScenarioView
+    descent: DescentMemory
+    belief: SafetyBelief | None = None
+    committed: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Candidates:
+    """Sites worth keeping open, the best first.
+
+    Attributes:
+        sites: [m] shape (k, 3).
+        probability: shape (k,), that a landing there ends on safe ground.
+    """
+
+    sites: Array
+    probability: Array
+
+    @property
+    def chances(self) -> Array:
+        """Shape (k,): chance that each is the first safe one in this order."""
+        unsafe = 1.0 - self.probability
+        return self.probability * np.concatenate([[1.0], np.cumprod(unsafe[:-1])])
+
+    def without(self, numbers: tuple[int, ...]) -> Candidates:
+        """Those not numbered."""
+        kept = [k for k in range(len(self.sites)) if k not in numbers]
+        return Candidates(self.sites[kept], self.probability[kept])
+
+
+@dataclass(frozen=True)
+class DeferredDecisionPolicy:
+    """Fly the trunk to several candidates; commit when its branches part.
+
+    Attributes:
+        name: name in tables.
+        options: how candidates are chosen and kept open.
+        descent: guidance once committed, and where there is nothing to defer.
+    """
+
+    name: str = "deferred-decision"
+    options: DeferredDecisionOptions = DeferredDecisionOptions()
+    descent: AdjustedDescent = field(default_factory=AdjustedDescent)
+
+    def begin(self, scenario_view: ScenarioView, rng: np.random.Generator) -> DeferredDecisionMemory:
+        """Nothing seen yet; no random numbers are drawn."""
+        self._ranking().begin(scenario_view)
+        return DeferredDecisionMemory(scenario_view, self.descent.begin(scenario_view))
+
+    def decide(
+        self, observation: Observation, memory: DeferredDecisionMemory
+    ) -> tuple[Decision, DeferredDecisionMemory]:
+        """Fuse the look, rank the candidates, and fly the trunk or the site committed to."""
+        first = memory.belief is None
+        belief = fuse_look(observation, memory.view, memory.belief)
+        memory = replace(memory, belief=belief)
+        height = float(observation.state.position[2] - observation.target[2])
+        if height <= 0.0 or (not first and observation.time_to_go <= self.options.commit_time):
+            return self._fly_to(observation.target, observation, replace(memory, committed=True))
+        safe = infer_unseen(belief.probability(), belief.seen)
+        landing = landing_probability(safe, self.options.dispersion)
+        present = belief.cell(observation.target)
+        if memory.committed and present is not None and landing[present] >= self.options.keep_probability:
+            return self._fly_to(observation.target, observation, memory)
+        price = self._ranking().price(observation, memory.view, belief)
+        candidates = self._choose(price, landing, observation, belief)
+        reference = None if memory.committed else self._defer(observation, candidates, memory)
+        if reference is None:
+            return self._fly_to(candidates.sites[0], observation, replace(memory, committed=True))
+        return self._track(reference, candidates.sites[0], memory)
+
+    def _ranking(self) -> HazardAwareSite:
+        """The objective of `hazard_aware` without the looks to come: deferral stands in for them."""
+        return HazardAwareSite(
+            HazardAwareWeights(
+                failure_cost=self.options.failure_cost,
+                divert_cost=0.0,
+                dispersion=self.options.dispersion,
+                commit_time=_NEVER,
+            )
+        )
+
+    def _choose(
+        self, price: Array, landing: NDArray[np.float32], observation: Observation, belief: SafetyBelief
+    ) -> Candidates:
+        """The best site, then the best of those far enough from all before, and so on."""
+        options, price = self.options, price.copy()
+        reach = max(math.ceil(options.separation) - 1, 0)
+        present = belief.cell(observation.target)
+        cells: list[tuple[int, int]] = []
+        for _ in range(options.candidates):
+            row, column = divmod(int(np.argmin(price)), price.shape[1])
+            if not math.isfinite(price[row, column]):
+                break
+            if (
+                not cells
+                and present is not None
+                and price[present] <= price[row, column] + options.switch_gain
+            ):
+                row, column = present
+            cells.append((row, column))
+            price[max(row - reach, 0) : row + reach + 1, max(column - reach, 0) : column + reach + 1] = np.inf
+        plane = float(observation.target[2])
+        sites = np.array([belief.site(*cell, plane) for cell in cells])
+        if cells[0] == present:
+            sites[0] = observation.target
+        return Candidates(sites, np.array([float(landing[cell]) for cell in cells]))
+
+    def _defer(
+        self, observation: Observation, candidates: Candidates, memory: DeferredDecisionMemory
+    ) -> TrackingReference | None:
+        """The trunk and its first branch; None where the trunk does not reach the next look."""
+        view, planned = memory.view, self.descent.planned
+        landing = self._soft_landing(observation, candidates.sites[0], view)
+        if landing is None or landing.status is not PlanStatus.OPTIMAL or landing.plan is None:
+            return None
+        answer = self._branch(landing, candidates)
+        if len(answer.unreachable) > 0 and 0 not in answer.unreachable:
+            candidates = candidates.without(answer.unreachable)
+            answer = self._branch(landing, candidates)
+        if len(answer.plans) < 2 or answer.parting_time < view.decision_interval:
+            return None
+        options = planned.options
+        sinking = options.terminal_deceleration * options.terminal_periods * view.control_period
+        return sample_descent(answer.plans[0], sinking, view.control_period, options)
+
+    def _branch(self, landing: SoftLanding, candidates: Candidates) -> DeferredDecision:
+        """The programme, in the frame of the plan to the first candidate's gate."""
+        assert landing.plan is not None
+        gate = landing.plan.problem.target
+        return plan_deferred(
+            landing.plan.problem,
+            gate + (candidates.sites - candidates.sites[0]),
+            self.options.budget,
+            landing.plan.time_of_flight,
+            self.options.nodes,
+            candidates.chances,
+        )
+
+    def _soft_landing(self, observation: Observation, site: Array, view: ScenarioView) -> SoftLanding | None:
+        """Plan to the first candidate; None where that is out of the planner's range."""
+        options, state = self.descent.planned.options, observation.state
+        duration = options.terminal_periods * view.control_period
+        if state.mass <= view.lander.dry_mass:
+            return None
+        if state.position[2] - site[2] <= 0.5 * options.terminal_deceleration * duration**2:
+            return None
+        return plan_soft_landing(state, site, view.lander, view.control_period, options, view.gravity)
+
+    def _track(
+        self, reference: TrackingReference, site: Array, memory: DeferredDecisionMemory
+    ) -> tuple[Decision, DeferredDecisionMemory]:
+        view = memory.view
+        periods = round(view.decision_interval / view.control_period)
+        command = PlanCommand(reference, tracking_gains(view.control_period, self.descent.planned.weights))
+        descent = replace(memory.descent, site=site.copy(), reference=reference.after(periods))
+        return Decision(site, command, DecisionStatus.NOMINAL), replace(memory, descent=descent)
+
+    def _fly_to(
+        self, site: Array, observation: Observation, memory: DeferredDecisionMemory
+    ) -> tuple[Decision, DeferredDecisionMemory]:
+        command, status, descent = self.descent.command(observation, site, memory.descent)
+        return Decision(site, command, status), replace(memory, descent=descent)
