@@ -25,8 +25,10 @@ from hda.dtm_library import Ground, remove_tiles
 from hda.presets import PRESETS, find_preset, sample_scenario
 from hda.scenario import Preset
 from hda.terrain import TerrainParameters
+from studies.command_line import one_line_errors
+from studies.executor import local_processes
 from studies.ground_statistics import GroundStatistics, measure_ground
-from studies.monte_carlo import Study, local_processes, prepare_study, run_study
+from studies.monte_carlo import Study, prepare_study, run_study
 from studies.paper import PAPER_ROWS
 from studies.rows import MEASURES
 
@@ -190,6 +192,7 @@ def calibrate(options: Calibration) -> SingleDivertRow:
     """Run the calibration that the command line asks for; return the final row."""
     finite_number("episodes", options.episodes, at_least=1)
     finite_number("sweep_episodes", options.sweep_episodes, at_least=1)
+    finite_number("workers", options.workers, at_least=1)
     preset = find_preset(options.preset)
     options.out.mkdir(parents=True, exist_ok=True)
     if options.search:
@@ -242,8 +245,10 @@ def print_ground(preset: Preset) -> None:
 
 
 def main() -> None:
-    """Command line."""
-    calibrate(tyro.cli(Calibration, description=__doc__))
+    """Command line; a wrong option is one line on stderr and exit code 2."""
+    options = tyro.cli(Calibration, description=__doc__)
+    with one_line_errors():
+        calibrate(options)
 
 
 if __name__ == "__main__":

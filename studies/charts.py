@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from studies.figures import COLORS
+from studies.histograms import MeasureHistograms
 from studies.paired import PairedDifference
 from studies.paper import PAPER_ROWS
-from studies.rows import EpisodeRow
 from studies.table import PolicySummary
 
 if TYPE_CHECKING:
@@ -26,7 +26,6 @@ LABELS = {
     "minimum_slant_angle_deg": "minimum slant angle [deg]",
     "maximum_thrust_n": "maximum thrust [N]",
 }
-_BINS = 40
 
 
 def line_style(index: int) -> dict[str, Any]:
@@ -120,21 +119,18 @@ def draw_differences(differences: Sequence[PairedDifference]) -> Figure:
     return figure
 
 
-def draw_histogram(measure: str, rows: Sequence[EpisodeRow], policies: Sequence[str]) -> Figure:
+def draw_histogram(measure: str, histograms: MeasureHistograms) -> Figure:
     """Distribution of a measure for each policy, as steps over equal bins; the end bins hold the rest."""
     from plotly.graph_objects import Figure, Scatter
 
-    samples = [np.array([getattr(row, measure) for row in rows if row.policy == name]) for name in policies]
-    low, high = (float(end) for end in np.quantile(np.concatenate(samples), (0.002, 0.998)))
-    edges = np.linspace(low, max(high, low + 1e-9), _BINS + 1)
+    edges = histograms.edges[measure]
     centers = np.round((edges[:-1] + edges[1:]) / 2.0, 6)
     figure = Figure()
-    for index, (name, sample) in enumerate(zip(policies, samples, strict=True)):
-        counts, _ = np.histogram(np.clip(sample, low, edges[-1]), bins=edges)
+    for index, name in enumerate(histograms.policies):
         figure.add_trace(
             Scatter(
                 x=centers.tolist(),
-                y=counts.tolist(),
+                y=histograms.count(measure, name).tolist(),
                 mode="lines",
                 line={**line_style(index), "shape": "hvh", "width": 1.6},
                 name=name,

@@ -29,7 +29,8 @@ from hda.presets import find_preset, sample_scenario
 from hda.scenario import Preset
 from hda.site_selection import NearestSafeSite, SingleDivertSite, SiteSelection
 from studies.command_line import one_line_errors
-from studies.monte_carlo import CHUNK_EPISODES, Study, local_processes, prepare_study
+from studies.executor import local_processes
+from studies.monte_carlo import CHUNK_EPISODES, Study, prepare_study
 from studies.rows import EpisodeRow, summarize_episode
 from studies.statistics import wilson_interval
 

@@ -1,8 +1,8 @@
 """Fly policies over the same episodes and print the table that compares them.
 
 Every policy meets the same ground, starts, map noise and thrust errors. Beside each ratio stands Wilson's
-interval and, in brackets, the interval clustered by tile; p is the exact McNemar test of safe landings
-against single-divert; means carry bootstrap intervals. Privileged policies see the true map.
+interval, beside each mean Student's, and in brackets the interval clustered by tile; p is the exact McNemar
+test of safe landings against single-divert. Privileged policies see the true map.
 """
 
 from __future__ import annotations
@@ -25,19 +25,17 @@ from hda.registry import policy_entry, policy_names
 from hda.scenario import Preset
 from studies.command_line import one_line_errors
 from studies.contract import check_contract
+from studies.executor import OpenExecutor, local_processes
 from studies.monte_carlo import (
     Study,
-    StudyResult,
     chunk_bounds,
     fly_chunks,
-    join_chunks,
-    local_processes,
     prepare_study,
 )
-from studies.paired import PairedDifference, compare_pairs, write_paired
+from studies.paired import compare_pairs, write_paired
 from studies.provenance import describe_study, write_provenance
 from studies.report import ReportContent, fly_report_flights, write_report
-from studies.rows import EpisodeRow
+from studies.scores import StudyScores, score_study
 from studies.study_folder import Existing, StudyFolder, open_study_folder
 from studies.table import (
     REFERENCE_POLICY,
@@ -66,7 +64,10 @@ class Comparison:
             split is then `own`.
         hazard_share: least share of unsafe ground around a first target on your terrain, 0 to 1; the preset's
             by default.
-        workers: processes; changes nothing but the time.
+        workers: processes of this machine; changes nothing but the time.
+        scheduler: address of a Dask scheduler, such as tcp://host:8786; its workers fly the episodes.
+        slurm: fly on workers in Slurm jobs; jobqueue.slurm in Dask's configuration describes a job.
+        slurm_jobs: jobs to submit.
         out: folder for results; results/PRESET by default.
         resume: go on with the study in the folder, which must be the same; begins it where there is none.
         overwrite: replace the study in the folder.
@@ -82,6 +83,9 @@ class Comparison:
     terrain: Path | None = None
     hazard_share: float | None = None
     workers: int = 2
+    scheduler: str | None = None
+    slurm: bool = False
+    slurm_jobs: int = 1
     out: Path | None = None
     resume: bool = False
     overwrite: bool = False
@@ -95,7 +99,7 @@ def plan_study(options: Comparison) -> Study:
     Raises:
         ValueError: an option is out of range or names something unknown.
     """
-    for name in ("episodes", "workers"):
+    for name in ("episodes", "workers", "slurm_jobs"):
         finite_number(name, getattr(options, name), at_least=1)
     finite_number("study_seed", options.study_seed, at_least=0)
     policies, paths = choose_policies(options.policies)
@@ -153,6 +157,24 @@ def choose_existing(options: Comparison) -> Existing:
     return Existing.OVERWRITE if options.overwrite else Existing.REFUSE
 
 
+def choose_executor(options: Comparison) -> tuple[OpenExecutor, bool]:
+    """What flies the episodes, and whether it is this machine.
+
+    Raises:
+        ValueError: two were asked for.
+    """
+    if options.scheduler is None and not options.slurm:
+        return partial(local_processes, options.workers), True
+    if options.scheduler is not None and options.slurm:
+        raise ValueError("scheduler and slurm exclude each other")
+    from studies.cluster import dask_scheduler, slurm_jobs
+
+    paths = tuple(entry for entry in options.policies if ":" in entry)
+    if options.scheduler is not None:
+        return partial(dask_scheduler, options.scheduler, paths), False
+    return partial(slurm_jobs, options.slurm_jobs, paths), False
+
+
 def open_folder(out: Path) -> Path:
     """Make the results folder and write a file in it, before any episode is flown.
 
@@ -172,56 +194,41 @@ def with_reference(study: Study) -> Study:
     return replace(study, policies=(*study.policies, REFERENCE_POLICY)) if missing else study
 
 
-def fly_with_progress(folder: StudyFolder, workers: int) -> StudyResult:
-    """Fly what a folder's study still lacks, on local processes under a progress bar."""
-    study = folder.study
-    chunks, damages = folder.read_chunks()
+def fly_with_progress(folder: StudyFolder, options: Comparison) -> None:
+    """Fly what a folder's study still lacks, under a progress bar; every chunk goes to the folder at once."""
+    study, workers = folder.study, options.workers
+    open_executor, here = choose_executor(options)
+    finished, damages = folder.find_finished()
     for damage in damages:
         Console(stderr=True).print(f"flown again: {damage}", style="yellow", markup=False, highlight=False)
-    finished = {(chunk.first, chunk.last) for chunk in chunks}
     missing = [bounds for bounds in chunk_bounds(study) if bounds not in finished]
-    if missing:
+    if missing and here:  # the workers of a cluster build the tiles that they meet
         prepare_study(study, workers)
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, transient=True) as progress:
         each = len(study.policies)
         done = sum(last - first for first, last in finished) * each
         task = progress.add_task("episodes", total=study.episodes * each, completed=done)
-        for chunk in fly_chunks(study, missing, partial(local_processes, workers), workers=workers):
+        for chunk in fly_chunks(study, missing, open_executor, workers=workers):
             folder.store(chunk)
-            chunks.append(chunk)
             progress.advance(task, (chunk.last - chunk.first) * each)
             if chunk.attempts > 1:
                 progress.console.print(
                     f"a worker died: episodes {chunk.first} to {chunk.last - 1} were flown again"
                 )
-    return join_chunks(study, chunks)
 
 
-def summarize_study(study: Study, rows: tuple[EpisodeRow, ...]) -> list[PolicySummary]:
-    """Score every policy of the study; `rows` must hold the reference policy too."""
-    by_policy: dict[str, list[EpisodeRow]] = {}
-    for row in rows:
-        by_policy.setdefault(row.policy, []).append(row)
+def summarize_study(study: Study, scores: StudyScores) -> list[PolicySummary]:
+    """The line of every policy of the study."""
     return [
         summarize_policy(
-            by_policy[name],
-            by_policy[REFERENCE_POLICY],
+            scores.policies[name],
             study.preset.name,
-            study.study_seed,
             policy_entry(name).privileged,
+            is_reference=name == scores.reference,
         )
         for name in study.policies
     ]
-
-
-def compare_study(study: Study, rows: tuple[EpisodeRow, ...]) -> list[PairedDifference]:
-    """Compare every policy of the study with the reference policy, whose rows must be among `rows`."""
-    by_policy: dict[str, Sequence[EpisodeRow]] = {
-        name: [row for row in rows if row.policy == name] for name in study.policies
-    }
-    reference = [row for row in rows if row.policy == REFERENCE_POLICY]
-    return compare_pairs(by_policy, reference, study.study_seed)
 
 
 def compare(options: Comparison) -> list[PolicySummary]:
@@ -234,37 +241,39 @@ def compare(options: Comparison) -> list[PolicySummary]:
     """
     study = plan_study(options)
     existing = choose_existing(options)
+    choose_executor(options)
     for path in study.paths:
         check_contract(policy_entry(path).make, study.preset)
     out = open_folder(options.out or Path("results") / study.preset.name)
     with open_study_folder(out, with_reference(study), existing) as folder:
-        flown = fly_with_progress(folder, options.workers)
-        summaries = write_results(folder, study, flown, options)
+        fly_with_progress(folder, options)
+        summaries = write_results(folder, study, options)
     print_table(summaries)
     Console().print(f"results in {out}")
     return summaries
 
 
-def write_results(
-    folder: StudyFolder, study: Study, flown: StudyResult, options: Comparison
-) -> list[PolicySummary]:
-    """Write every product of a flown study."""
+def write_results(folder: StudyFolder, study: Study, options: Comparison) -> list[PolicySummary]:
+    """Write every product of a flown study, reading its chunks one at a time."""
     out = folder.path
-    rows = tuple(row for row in flown.rows if row.policy in study.policies)
-    summaries = summarize_study(study, flown.rows)
-    differences = compare_study(study, flown.rows)
+    scores = score_study(study.policies, REFERENCE_POLICY, folder.read_chunks())
+    summaries = summarize_study(study, scores)
+    differences = compare_pairs(scores, study.policies)
     provenance = describe_study(folder.study, folder.describe_flight())
-    write_episodes(out, rows)
+    write_episodes(
+        out,
+        (row for name in study.policies for chunk in folder.read_chunks((name,)) for row in chunk.rows[name]),
+    )
     write_table(out / "table.csv", summaries)
     write_markdown(out / "table.md", summaries)
     write_paired(out / "paired.csv", differences)
-    write_timings(out / "timings.csv", {name: flown.decision_time[name] for name in study.policies})
+    write_timings(out / "timings.csv", {name: scores.policies[name].decision_time for name in study.policies})
     if options.figures:
         from studies.figures import draw_figures
 
-        draw_figures(out, study, rows)
+        draw_figures(out, study, scores)
     if options.report:
-        report_study(out, ReportContent(study, rows, summaries, differences, provenance), options.workers)
+        report_study(out, ReportContent(study, scores, summaries, differences, provenance), options.workers)
     write_provenance(out / "provenance.json", provenance)
     return summaries
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,8 +9,9 @@ import numpy as np
 
 from hda.episode import EpisodeRecord, fly
 from hda.presets import sample_scenario
+from studies.histograms import MeasureHistograms
 from studies.monte_carlo import Study
-from studies.rows import EpisodeRow
+from studies.scores import StudyScores
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,26 +28,18 @@ _PANELS = (
 )
 
 
-def draw_figures(out: Path, study: Study, rows: Sequence[EpisodeRow]) -> None:
+def draw_figures(out: Path, study: Study, scores: StudyScores) -> None:
     """Draw histograms into out/figures, one flight per policy too, and keep its path in out/trajectories."""
     figures, trajectories = out / "figures", out / "trajectories"
     figures.mkdir(exist_ok=True)
     trajectories.mkdir(exist_ok=True)
-    draw_histograms(figures / "histograms.png", study, rows)
-    scenario = sample_scenario(study.preset, study.study_seed, choose_episode(rows), study.split)
+    draw_histograms(figures / "histograms.png", study, scores.histograms)
+    scenario = sample_scenario(study.preset, study.study_seed, scores.hardest, study.split)
     for name in study.policies:
         record = fly(study.make_policy(name), scenario)
         stem = f"{name}-{scenario.streams.episode:06d}"
         draw_flight(figures / f"trajectory-{stem}.png", record)
         save_flight(trajectories / f"{stem}.npz", record)
-
-
-def choose_episode(rows: Sequence[EpisodeRow]) -> int:
-    """First episode that fewest policies land safely, but some do; else the first."""
-    safe: dict[int, int] = {}
-    for row in rows:
-        safe[row.episode] = safe.get(row.episode, 0) + row.safe_site
-    return min(safe, key=lambda episode: (safe[episode] == 0, safe[episode], episode))
 
 
 def save_flight(path: Path, record: EpisodeRecord) -> None:
@@ -56,19 +48,16 @@ def save_flight(path: Path, record: EpisodeRecord) -> None:
     np.savez_compressed(path, time=record.time, path=record.path, thrust=record.thrust, sites=sites)
 
 
-def draw_histograms(path: Path, study: Study, rows: Sequence[EpisodeRow]) -> None:
+def draw_histograms(path: Path, study: Study, histograms: MeasureHistograms) -> None:
     """Draw the distributions that the paper shows, as step histograms of equal bins."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(14, 7), layout="constrained")
     axes = figure.subplots(2, 3).ravel()
     for axis, (name, label) in zip(axes, _PANELS, strict=False):
-        values = {p: np.array([getattr(r, name) for r in rows if r.policy == p]) for p in study.policies}
-        low, high = np.quantile(np.concatenate(list(values.values())), (0.002, 0.998))
-        bins = np.linspace(low, max(high, low + 1e-9), 41)
-        for k, (policy, sample) in enumerate(values.items()):
-            style = {"color": COLORS[k % len(COLORS)], "linewidth": 1.6}
-            axis.hist(np.clip(sample, low, high), bins=bins.tolist(), histtype="step", label=policy, **style)
+        for k, policy in enumerate(study.policies):
+            counts, color = histograms.count(name, policy), COLORS[k % len(COLORS)]
+            axis.stairs(counts, histograms.edges[name], label=policy, color=color, linewidth=1.6)
         axis.set_xlabel(label)
         axis.set_ylabel("episodes")
         axis.grid(alpha=0.25)

@@ -16,9 +16,9 @@ from hda.episode import EpisodeRecord, fly
 from hda.policy import ZemZevCommand
 from hda.presets import sample_scenario
 from hda.tile import Tile
-from studies.figures import choose_episode, save_flight
+from studies.figures import save_flight
 from studies.monte_carlo import Study
-from studies.rows import EpisodeRow
+from studies.scores import StudyScores
 
 MOST_FLIGHTS = 130
 FAILED_PER_POLICY = 8
@@ -56,23 +56,24 @@ class FlightPicture:
     data: dict[str, Any]
 
 
-def choose_flights(rows: Sequence[EpisodeRow], policies: Sequence[str]) -> list[tuple[str, int]]:
+def choose_flights(scores: StudyScores, policies: Sequence[str]) -> list[tuple[str, int]]:
     """Choose (policy, episode) pairs: two episodes that all policies show, and failures of each policy.
 
     The shared ones are the first that fewest policies landed safely, and the first of the study. Failures are
     taken in turns from each kind of ending, the rarest first. Never more than MOST_FLIGHTS in all, unless the
     shared ones alone are more.
     """
-    shared = sorted({choose_episode(rows), min(row.episode for row in rows)})
+    shared = sorted(scores.shared)
     most_failed = max(0, min(FAILED_PER_POLICY, MOST_FLIGHTS // len(policies) - len(shared)))
     chosen = []
     for policy in policies:
-        kinds: dict[str, list[int]] = {}
-        for row in rows:
-            if row.policy == policy and not row.success and row.episode not in shared:
-                kinds.setdefault(row.outcome, []).append(row.episode)
+        kinds: dict[str, tuple[int, list[int]]] = {}
+        for kind, (count, first) in scores.policies[policy].failures.items():
+            shown = [own[policy] for own in scores.shared.values()]
+            count -= sum(row.outcome == kind and not row.success for row in shown)
+            kinds[kind] = count, [episode for episode in first if episode not in shared]
         failed: list[int] = []
-        queues = [list(kinds[kind]) for kind in sorted(kinds, key=lambda kind: (len(kinds[kind]), kind))]
+        queues = [kinds[kind][1] for kind in sorted(kinds, key=lambda kind: (kinds[kind][0], kind))]
         while len(failed) < most_failed and any(queues):
             failed += [queue.pop(0) for queue in queues if queue]
         chosen += [(policy, episode) for episode in sorted([*shared, *failed[:most_failed]])]

@@ -1,21 +1,18 @@
 """Many episodes, the same for every policy, spread over processes.
 
 Episode k is a function of the study seed and k alone, so neither the number of workers nor the order or
-choice of policies changes a row. Episodes run in chunks through a `concurrent.futures.Executor`; any that
-pickles will do. A worker that dies (out of memory, killed) costs a retry of the chunks that it may have held.
+choice of policies changes a row. Episodes run in chunks through an executor (`studies.executor`). A worker
+that dies (out of memory, killed) costs a retry of the chunks that it may have held.
 """
 
 from __future__ import annotations
 
-import os
-import threading
 import traceback
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
-from multiprocessing import get_context, parent_process
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,21 +22,17 @@ from hda.episode import fly
 from hda.presets import sample_scenario
 from hda.registry import AnyPolicy, make_policy, policy_entry
 from hda.scenario import Preset
+from studies.executor import ClusterExecutor, OpenExecutor, WorkerDiedError
 from studies.rows import EpisodeRow, summarize_episode
 
 CHUNK_EPISODES = 10
+MOST_CHUNKS = 10_000
 MOST_ATTEMPTS = 3
 _CHUNKS_AT_ONCE = 2  # chunks handed to an executor, per worker: enough to keep it busy, few to fly again
-
-OpenExecutor = Callable[[], AbstractContextManager[Executor | None]]
 
 
 class PolicyError(ValueError):
     """A policy raised something in flight; the message names it and the episode."""
-
-
-class WorkerDiedError(ValueError):
-    """Workers died again and again while they held the same episodes."""
 
 
 @dataclass(frozen=True)
@@ -103,8 +96,14 @@ class Chunk:
 
 def chunk_bounds(study: Study) -> list[tuple[int, int]]:
     """(first episode, one past the last) of every chunk of a study."""
-    starts = range(0, study.episodes, CHUNK_EPISODES)
-    return [(first, min(first + CHUNK_EPISODES, study.episodes)) for first in starts]
+    size = chunk_episodes(study.episodes)
+    starts = range(0, study.episodes, size)
+    return [(first, min(first + size, study.episodes)) for first in starts]
+
+
+def chunk_episodes(episodes: int) -> int:
+    """Episodes of a chunk: few, but so many that a study has at most MOST_CHUNKS files of them."""
+    return max(CHUNK_EPISODES, -(-episodes // MOST_CHUNKS))
 
 
 def fly_chunk(study: Study, first: int, last: int) -> Chunk:
@@ -132,32 +131,6 @@ def fly_chunk(study: Study, first: int, last: int) -> Chunk:
     return Chunk(first, last, rows, {name: np.concatenate(parts) for name, parts in times.items()})
 
 
-@contextmanager
-def local_processes(workers: int) -> Iterator[Executor | None]:
-    """Processes on this machine; None for one worker, which flies in this process."""
-    if workers == 1:
-        yield None
-        return
-    pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_end_with_parent)
-    try:
-        yield pool
-    finally:
-        pool.shutdown(cancel_futures=True)
-
-
-def _end_with_parent() -> None:
-    """Let this worker end when its parent is killed; else it would wait for work for ever."""
-    parent = parent_process()
-    if parent is None:
-        return
-
-    def watch() -> None:
-        parent.join()
-        os._exit(1)
-
-    threading.Thread(target=watch, name="watch-parent", daemon=True).start()
-
-
 def fly_chunks(
     study: Study,
     bounds: Iterable[tuple[int, int]],
@@ -175,7 +148,8 @@ def fly_chunks(
         bounds: (first episode, one past the last) of each chunk.
         open_executor: makes the executor that runs the chunks; None in place of one flies them here.
         most_attempts: how often a chunk may be begun.
-        workers: processes of the executor; twice as many chunks are handed to it at a time.
+        workers: processes of the executor, unless it counts them itself; twice as many chunks are handed to
+            it at a time.
 
     Raises:
         PolicyError: a policy raised something.
@@ -190,7 +164,7 @@ def fly_chunks(
                     first, last, _ = waiting.popleft()
                     yield fly_chunk(study, first, last)
                 return
-            yield from _fly_until_broken(study, waiting, lost, executor, _CHUNKS_AT_ONCE * workers)
+            yield from _fly_until_broken(study, waiting, lost, executor, workers)
         for first, last, attempts in sorted(lost, reverse=True):
             if attempts >= most_attempts:
                 raise WorkerDiedError(
@@ -205,11 +179,13 @@ def _fly_until_broken(
     waiting: deque[tuple[int, int, int]],
     lost: list[tuple[int, int, int]],
     executor: Executor,
-    at_once: int,
+    workers: int,
 ) -> Iterator[Chunk]:
     """Fly what waits until nothing does or the executor breaks; then `lost` holds what it had been given."""
     running: dict[Future[Chunk], tuple[int, int, int]] = {}
+    cluster = executor if isinstance(executor, ClusterExecutor) else None
     while (waiting or running) and not lost:
+        at_once = _CHUNKS_AT_ONCE * max(1, cluster.count_workers() if cluster else workers)
         try:
             while waiting and len(running) < at_once:
                 running[executor.submit(fly_chunk, study, *waiting[0][:2])] = waiting[0]
@@ -224,8 +200,11 @@ def _fly_until_broken(
                 chunk = future.result()
             except BrokenExecutor:
                 lost.append(task)
+            except WorkerDiedError as error:
+                raise WorkerDiedError(f"{error} while it held episodes {task[0]} to {task[1] - 1}") from error
             else:
-                yield replace(chunk, attempts=task[2])
+                restarts = cluster.count_restarts(future) if cluster else 0
+                yield replace(chunk, attempts=task[2] + restarts)
     lost.extend(running.values())
 
 

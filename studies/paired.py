@@ -11,11 +11,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from studies.rows import MEASURES, EpisodeRow
-from studies.statistics import Interval, bootstrap_mean, mcnemar_p_value, wilson_interval
-
-RATIOS = ("safe_site", "success")
-_BOOTSTRAP_STREAM = 7919  # keeps these resamples apart from those of the table
+from studies.moments import mean_intervals
+from studies.rows import MEASURES, RATIOS
+from studies.scores import StudyScores
+from studies.statistics import Interval, PairCounts, count_pairs, mcnemar_count_p_value, wilson_interval
 
 
 @dataclass(frozen=True)
@@ -26,7 +25,8 @@ class PairedDifference:
         policy: name.
         reference: name of the policy that is subtracted.
         ratios: safe_site, success -> difference of the ratios with its interval, in [-1, 1].
-        means: measure -> mean difference with its bootstrap interval.
+        means: measure -> mean difference with Student's interval.
+        means_by_tile: measure -> the same with the interval clustered by tile.
         mcnemar_p: exact McNemar test of `safe_site`.
         holm_p: the same, corrected for the number of policies in the study.
     """
@@ -35,6 +35,7 @@ class PairedDifference:
     reference: str
     ratios: dict[str, Interval]
     means: dict[str, Interval]
+    means_by_tile: dict[str, Interval]
     mcnemar_p: float
     holm_p: float
 
@@ -57,13 +58,21 @@ def paired_ratio_interval(first: ArrayLike, second: ArrayLike, confidence: float
     Raises:
         ValueError: an argument is empty or holds something else, or the shapes differ.
     """
-    mcnemar_p_value(first, second)  # checks both
-    one, other = np.asarray(first) == 1, np.asarray(second) == 1
-    count = one.size
-    a = wilson_interval(int(one.sum()), count, confidence)
-    b = wilson_interval(int(other.sum()), count, confidence)
-    correlation = _corrected_correlation(one, other)
-    difference = (int(one.sum()) - int(other.sum())) / count
+    return pair_count_interval(count_pairs(first, second), confidence)
+
+
+def pair_count_interval(pairs: PairCounts, confidence: float = 0.95) -> Interval:
+    """The interval of `paired_ratio_interval`, from counts.
+
+    Raises:
+        ValueError: there is no episode, or `confidence` is out of range.
+    """
+    count = pairs.episodes
+    first, second = pairs.both + pairs.only_first, pairs.both + pairs.only_second
+    a = wilson_interval(first, count, confidence)
+    b = wilson_interval(second, count, confidence)
+    correlation = _corrected_correlation(pairs)
+    difference = (first - second) / count
 
     def reach(near: float, far: float) -> float:
         return math.sqrt(max(0.0, near * near - 2.0 * correlation * near * far + far * far))
@@ -73,17 +82,15 @@ def paired_ratio_interval(first: ArrayLike, second: ArrayLike, confidence: float
     return Interval(difference, max(-1.0, low), min(1.0, high))
 
 
-def _corrected_correlation(one: NDArray[np.bool_], other: NDArray[np.bool_]) -> float:
+def _corrected_correlation(pairs: PairCounts) -> float:
     """Phi coefficient of the pairs; a positive association is lessened by half an episode's worth."""
-    both = int((one & other).sum())
-    neither = int((~one & ~other).sum())
-    only_one, only_other = int((one & ~other).sum()), int((~one & other).sum())
-    margins = (both + only_one) * (only_other + neither) * (both + only_other) * (only_one + neither)
+    first, second = pairs.both + pairs.only_first, pairs.both + pairs.only_second
+    margins = first * (pairs.episodes - first) * second * (pairs.episodes - second)
     if margins == 0:
         return 0.0
-    product = float(both * neither - only_one * only_other)
+    product = float(pairs.both * pairs.neither - pairs.only_first * pairs.only_second)
     if product > 0.0:
-        product = max(product - one.size / 2.0, 0.0)
+        product = max(product - pairs.episodes / 2.0, 0.0)
     return product / math.sqrt(margins)
 
 
@@ -109,51 +116,27 @@ def holm_adjust(p_values: ArrayLike) -> NDArray[np.float64]:
     return adjusted
 
 
-def compare_pairs(
-    rows: dict[str, Sequence[EpisodeRow]], reference: Sequence[EpisodeRow], study_seed: int
-) -> list[PairedDifference]:
-    """Compare every policy with the reference.
-
-    Args:
-        rows: policy -> its rows; the reference policy itself is left out.
-        reference: rows of the reference policy, of the same episodes.
-        study_seed: seeds the bootstrap.
-
-    Raises:
-        ValueError: the episodes of a policy are not those of the reference.
-    """
-    name = reference[0].policy
-    others = {policy: own for policy, own in rows.items() if policy != name}
-    p_values = []
-    for policy, own in others.items():
-        if [row.episode for row in own] != [row.episode for row in reference]:
-            raise ValueError(f"policy {policy!r} and {name!r} must have flown the same episodes")
-        p_values.append(mcnemar_p_value(_column(own, "safe_site"), _column(reference, "safe_site")))
+def compare_pairs(scores: StudyScores, policies: Sequence[str]) -> list[PairedDifference]:
+    """Compare policies with the reference policy, which is left out itself."""
+    others = [scores.policies[name] for name in policies if name != scores.reference]
+    p_values = [mcnemar_count_p_value(score.pairs["safe_site"]) for score in others]
     adjusted = holm_adjust(p_values)
-    return [
-        PairedDifference(
-            policy=policy,
-            reference=name,
-            ratios={
-                ratio: paired_ratio_interval(_column(own, ratio), _column(reference, ratio))
-                for ratio in RATIOS
-            },
-            means={
-                measure: bootstrap_mean(
-                    _column(own, measure) - _column(reference, measure),
-                    np.random.default_rng([study_seed, k, _BOOTSTRAP_STREAM]),
-                )
-                for k, measure in enumerate(MEASURES)
-            },
-            mcnemar_p=p_values[index],
-            holm_p=float(adjusted[index]),
+    found = []
+    for index, score in enumerate(others):
+        moments = score.differences.collect()
+        means = {name: mean_intervals(moments, k) for k, name in enumerate(MEASURES)}
+        found.append(
+            PairedDifference(
+                policy=score.policy,
+                reference=scores.reference,
+                ratios={name: pair_count_interval(score.pairs[name]) for name in RATIOS},
+                means={name: plain for name, (plain, _) in means.items()},
+                means_by_tile={name: by_tile for name, (_, by_tile) in means.items()},
+                mcnemar_p=p_values[index],
+                holm_p=float(adjusted[index]),
+            )
         )
-        for index, (policy, own) in enumerate(others.items())
-    ]
-
-
-def _column(rows: Sequence[EpisodeRow], name: str) -> NDArray[np.float64]:
-    return np.array([getattr(row, name) for row in rows], dtype=np.float64)
+    return found
 
 
 def write_paired(path: Path, differences: Sequence[PairedDifference]) -> None:
@@ -162,6 +145,7 @@ def write_paired(path: Path, differences: Sequence[PairedDifference]) -> None:
     header += [f"{name}_points{end}" for name in RATIOS for end in ("", "_low", "_high")]
     header += ["mcnemar_p", "holm_p"]
     header += [f"{name}{end}" for name in MEASURES for end in ("", "_low", "_high")]
+    header += [f"{name}_tile_{end}" for name in MEASURES for end in ("low", "high")]
     with path.open("w", newline="") as stream:
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(header)
@@ -169,6 +153,7 @@ def write_paired(path: Path, differences: Sequence[PairedDifference]) -> None:
             cells = [100.0 * value for name in RATIOS for value in _ends(difference.ratios[name])]
             cells += [difference.mcnemar_p, difference.holm_p]
             cells += [value for name in MEASURES for value in _ends(difference.means[name])]
+            cells += [value for name in MEASURES for value in _ends(difference.means_by_tile[name])[1:]]
             writer.writerow([difference.policy, difference.reference, *(f"{value:.9g}" for value in cells)])
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from studies.compare import local_processes
+from studies.executor import local_processes
 from studies.monte_carlo import Study, StudyResult, chunk_bounds, fly_chunks, join_chunks, prepare_study
 from studies.rows import EpisodeRow
 from studies.study_folder import Existing, open_study_folder
@@ -67,14 +67,12 @@ def fly_points(out: Path, points: Sequence[Point], existing: Existing, workers: 
 def _fly_point(path: Path, study: Study, existing: Existing, workers: int, progress: Progress) -> StudyResult:
     task = progress.task_ids[0]
     with open_study_folder(path, study, existing) as folder:
-        chunks, damages = folder.read_chunks()
+        finished, damages = folder.find_finished()
         for damage in damages:
             Console(stderr=True).print(f"flown again: {damage}", style="yellow", markup=False)
-        finished = {(chunk.first, chunk.last) for chunk in chunks}
         progress.advance(task, sum(last - first for first, last in finished) * len(study.policies))
         missing = [bounds for bounds in chunk_bounds(study) if bounds not in finished]
         for chunk in fly_chunks(study, missing, partial(local_processes, workers), workers=workers):
             folder.store(chunk)
-            chunks.append(chunk)
             progress.advance(task, (chunk.last - chunk.first) * len(study.policies))
-    return join_chunks(study, chunks)
+        return join_chunks(study, folder.read_chunks())

@@ -10,13 +10,14 @@ import subprocess
 import sys
 from dataclasses import asdict
 from datetime import UTC, datetime
+from functools import cache
 from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 from hda.dtm_library import FORMAT_VERSION, Ground
 from hda.own_terrain import OwnTerrain
-from studies.monte_carlo import CHUNK_EPISODES, Study
+from studies.monte_carlo import Study, chunk_episodes
 
 _PACKAGES = (
     "casadi",
@@ -60,24 +61,36 @@ def identify_study(study: Study) -> dict[str, Any]:
             "study_seed": study.study_seed,
             "split": study.split,
             "paths": list(study.paths),
-            "chunk_episodes": CHUNK_EPISODES,
+            "chunk_episodes": chunk_episodes(study.episodes),
         },
         "preset": preset,
         "terrain_key": ground.key,
         "terrain_format": FORMAT_VERSION,
-        "python": platform.python_version(),
-        "machine": f"{platform.system()} {platform.machine()}",
-        "versions": {name: metadata.version(name) for name in ("lunar-hda", *_PACKAGES)},
-        "sources": digest_sources(study),
+        **identify_software(study.paths),
     }
 
 
-def digest_sources(study: Study) -> dict[str, str]:
+@cache
+def identify_software(paths: tuple[str, ...] = ()) -> dict[str, Any]:
+    """What must be the same in every process that flies episodes of a study; looked at once in a process.
+
+    Args:
+        paths: paths `package.module:Name` of policies that are not registered.
+    """
+    return {
+        "python": platform.python_version(),
+        "machine": f"{platform.system()} {platform.machine()}",
+        "versions": {name: metadata.version(name) for name in ("lunar-hda", *_PACKAGES)},
+        "sources": digest_sources(paths),
+    }
+
+
+def digest_sources(paths: tuple[str, ...]) -> dict[str, str]:
     """Package -> digest of every file in it, weights included; also the module of a policy given by path."""
     root = Path(__file__).resolve().parent
     digests = {name: _digest(root.parent / name) for name in ("guidance", "hda", "rl")}
     digests["studies"] = _digest(root / "monte_carlo.py", root / "rows.py")
-    for path in study.paths:
+    for path in paths:
         module = path.partition(":")[0]
         found = importlib.util.find_spec(module)
         if found is not None and found.origin is not None:

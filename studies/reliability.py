@@ -51,6 +51,26 @@ def exact_interval(successes: int, episodes: int, confidence: float = 0.95) -> I
     return Interval(successes / episodes, float(ends.low), float(ends.high))
 
 
+def exact_lower_bound(successes: int, episodes: int, confidence: float = 0.9) -> float:
+    """One-sided bound of a success ratio, "at least this, with 90 % confidence" (Clopper and Pearson 1934).
+
+    Args:
+        successes: from 0 to `episodes`.
+        episodes: at least 1; independent.
+        confidence: in (0, 0.9999].
+
+    Raises:
+        ValueError: an argument is out of range.
+    """
+    from scipy.stats import binomtest
+
+    finite_number("episodes", episodes, at_least=1)
+    finite_number("successes", successes, at_least=0, at_most=episodes)
+    level = finite_number("confidence", confidence, above=0.0, at_most=0.9999)
+    test = binomtest(successes, episodes, alternative="greater")
+    return float(test.proportion_ci(confidence_level=level, method="exact").low)
+
+
 def allowed_failures(episodes: int, share: float, confidence: float = 0.9) -> int | None:
     """Greatest number of failures that still shows that a requirement is met in a share of flights.
 

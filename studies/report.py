@@ -9,7 +9,7 @@ from __future__ import annotations
 import csv
 import json
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -21,12 +21,14 @@ from studies.charts import (
     draw_ratio_against_propellant,
     line_style,
 )
+from studies.executor import OpenExecutor
 from studies.flights import FlightPicture, choose_flights, fly_pictures, picture_ground
-from studies.monte_carlo import OpenExecutor, Study
-from studies.paired import RATIOS, PairedDifference
+from studies.monte_carlo import Study
+from studies.paired import PairedDifference
 from studies.paper import PAPER_ROWS
-from studies.rows import MEASURES, EpisodeRow
-from studies.table import REFERENCE_POLICY, PolicySummary
+from studies.rows import MEASURES, RATIOS
+from studies.scores import StudyScores
+from studies.table import AT_LEAST_CONFIDENCE, REFERENCE_POLICY, PolicySummary
 
 _DIGITS = {"miss_distance_m": 3, "touchdown_speed_mps": 3, "maximum_thrust_n": 0}
 
@@ -37,14 +39,14 @@ class ReportContent:
 
     Attributes:
         study: what was flown.
-        rows: rows of the policies of the study.
+        scores: what its episodes gave.
         summaries: lines of the table.
         differences: paired differences from the reference policy.
         provenance: where it comes from.
     """
 
     study: Study
-    rows: tuple[EpisodeRow, ...]
+    scores: StudyScores
     summaries: list[PolicySummary]
     differences: list[PairedDifference]
     provenance: dict[str, Any]
@@ -75,12 +77,12 @@ def fly_report_flights(
     """Fly again the episodes that the report shows; their whole flights go to `folder` as NPZ.
 
     Args:
-        content: rows and study.
+        content: scores and study.
         open_executor: makes the executor that flies them.
         folder: for the NPZ files.
         on_progress: called with (flights done, flights in all).
     """
-    chosen = choose_flights(content.rows, content.study.policies)
+    chosen = choose_flights(content.scores, content.study.policies)
     done = 0
 
     def advance() -> None:
@@ -150,7 +152,7 @@ def make_charts(content: ReportContent) -> dict[str, Any]:
     if content.differences:
         figures["differences"] = draw_differences(content.differences)
     for measure in LABELS:
-        figures[f"histogram-{measure}"] = draw_histogram(measure, content.rows, content.study.policies)
+        figures[f"histogram-{measure}"] = draw_histogram(measure, content.scores.histograms)
     return {name: json.loads(str(figure.to_json())) for name, figure in figures.items()}
 
 
@@ -160,6 +162,7 @@ def table_columns() -> list[tuple[str, str]]:
         ("policy", "policy"),
         ("safe_site_percent", "safe site [%]"),
         ("success_percent", "success [%]"),
+        ("success_at_least", f"success at least [%] (at {AT_LEAST_CONFIDENCE:.0%})"),
         ("mcnemar_p", "p"),
         *((name, LABELS[name]) for name in MEASURES),
         ("fallbacks", "fallbacks"),
@@ -178,11 +181,16 @@ def _table_line(row: dict[str, str]) -> list[Cell]:
     for name in RATIOS:
         shown = _shown(row, f"{name}_percent", 1, f"{name}_low", f"{name}_high")
         tile = _range(row[f"{name}_tile_low"], row[f"{name}_tile_high"], 1)
-        cells.append(Cell(shown.column, shown.value, shown.text, shown.range, f"[{tile}]"))
+        cells.append(replace(shown, tile_range=f"[{tile}]"))
     p = row["mcnemar_p"]
     cells.append(Cell("mcnemar_p", p, format_p(float(p)) if p else ""))
     for name in MEASURES:
-        cells.append(_shown(row, name, _DIGITS.get(name, 2), f"{name}_low", f"{name}_high"))
+        digits = _DIGITS.get(name, 2)
+        shown = _shown(row, name, digits, f"{name}_low", f"{name}_high")
+        tile = _range(row[f"{name}_tile_low"], row[f"{name}_tile_high"], digits)
+        cells.append(replace(shown, tile_range=f"[{tile}]"))
+    at_least = row["success_at_least"]
+    cells.insert(3, Cell("success_at_least", at_least, f"{float(at_least):.2f}"))
     return [*cells, Cell("fallbacks", row["fallbacks"], row["fallbacks"])]
 
 
@@ -221,7 +229,11 @@ def difference_lines(differences: Sequence[PairedDifference]) -> list[list[Cell]
         cells += [shown(f"{name}_points", difference.ratios[name], 100.0, 1) for name in RATIOS]
         for name, p in (("mcnemar_p", difference.mcnemar_p), ("holm_p", difference.holm_p)):
             cells.append(Cell(name, f"{p:.9g}", format_p(p)))
-        cells += [shown(name, difference.means[name], 1.0, _DIGITS.get(name, 2)) for name in MEASURES]
+        for name in MEASURES:
+            digits = _DIGITS.get(name, 2)
+            by_tile = difference.means_by_tile[name]
+            tile = f"[{by_tile.low:+.{digits}f} to {by_tile.high:+.{digits}f}]"
+            cells.append(replace(shown(name, difference.means[name], 1.0, digits), tile_range=tile))
         lines.append(cells)
     return lines
 

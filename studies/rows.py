@@ -7,6 +7,9 @@ from dataclasses import dataclass, fields
 
 from hda.episode import EpisodeRecord
 
+RATIOS = ("safe_site", "success")
+"""Columns whose ratios stand in the table."""
+
 MEASURES = (
     "miss_distance_m",
     "touchdown_speed_mps",

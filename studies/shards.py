@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
@@ -77,8 +78,12 @@ def write_shard(folder: Path, chunk: Chunk, session: str) -> Path:
     return path
 
 
-def read_shard(path: Path) -> tuple[Chunk, str]:
+def read_shard(path: Path, policies: Collection[str] | None = None) -> tuple[Chunk, str]:
     """Read a chunk back, with the session that flew it.
+
+    Args:
+        path: the file.
+        policies: only the rows of these; of all by default.
 
     Raises:
         ShardError: the file is damaged or does not hold what its name says.
@@ -91,7 +96,11 @@ def read_shard(path: Path) -> tuple[Chunk, str]:
             raise ShardError(f"{path} was written by another version")
         if hashlib.sha256(body).hexdigest() != header["sha256"]:
             raise ShardError(f"{path} is damaged: its checksum does not hold")
-        chunk = _parse_chunk(header, [json.loads(line) for line in body.splitlines()])
+        lines = body.splitlines()
+        if policies is not None:
+            heads = tuple(f'{{"policy": {json.dumps(name)}, '.encode() for name in policies)
+            lines = [line for line in lines if line.startswith(heads)]
+        chunk = _parse_chunk(header, [json.loads(line) for line in lines])
         session = str(header["session"])
     except ShardError:
         raise

@@ -75,24 +75,40 @@ def clustered_interval(success: ArrayLike, tile: ArrayLike, confidence: float = 
     Raises:
         ValueError: an argument is empty, of the wrong shape, or holds something else.
     """
-    from scipy.special import ndtri, stdtrit
-
     hits = _outcomes("success", success)
     labels = np.asarray(tile)
     if labels.shape != hits.shape:
         raise ValueError(f"tile must have the shape of success, {hits.shape}, got {labels.shape}")
+    _, member = np.unique(labels, return_inverse=True)
+    return clustered_count_interval(np.bincount(member, weights=hits), np.bincount(member), confidence)
+
+
+def clustered_count_interval(successes: ArrayLike, episodes: ArrayLike, confidence: float = 0.95) -> Interval:
+    """The interval of `clustered_interval` from the counts of each tile.
+
+    Args:
+        successes: shape (tiles,).
+        episodes: shape (tiles,), each at least 1.
+        confidence: in (0, 0.9999].
+
+    Raises:
+        ValueError: `confidence` is out of range.
+    """
+    from scipy.special import ndtri, stdtrit
+
     level = _confidence(confidence)
-    names, member = np.unique(labels, return_inverse=True)
-    clusters, episodes, ratio = names.size, hits.size, float(hits.mean())
+    hits, flown = np.asarray(successes, dtype=np.float64), np.asarray(episodes)
+    clusters, total = flown.size, int(flown.sum())
+    ratio = float(hits.sum()) / total
     if clusters == 1:
         return Interval(ratio, 0.0, 1.0)
-    residual = np.bincount(member, weights=hits) - ratio * np.bincount(member)
-    variance = clusters / (clusters - 1) * float(residual @ residual) / episodes**2
-    independent = ratio * (1.0 - ratio) / episodes
+    residual = hits - ratio * flown
+    variance = clusters / (clusters - 1) * float(residual @ residual) / total**2
+    independent = ratio * (1.0 - ratio) / total
     design_effect = max(1.0, variance / independent) if independent > 0.0 else 1.0
     normal = float(ndtri(0.5 + 0.5 * level))
     student = float(stdtrit(clusters - 1, 0.5 + 0.5 * level))
-    return _score_interval(ratio, episodes / design_effect * (normal / student) ** 2, normal)
+    return _score_interval(ratio, total / design_effect * (normal / student) ** 2, normal)
 
 
 def bootstrap_mean(
@@ -144,15 +160,54 @@ def mcnemar_p_value(first: ArrayLike, second: ArrayLike) -> float:
     Raises:
         ValueError: an argument is empty or holds something else, or the shapes differ.
     """
-    from scipy.stats import binomtest
+    return mcnemar_count_p_value(count_pairs(first, second))
 
+
+@dataclass(frozen=True)
+class PairCounts:
+    """How the same episodes ended for two policies.
+
+    Attributes:
+        both: episodes in which both succeed.
+        only_first: the first alone.
+        only_second: the second alone.
+        neither: none.
+    """
+
+    both: int
+    only_first: int
+    only_second: int
+    neither: int
+
+    @property
+    def episodes(self) -> int:
+        """All of them."""
+        return self.both + self.only_first + self.only_second + self.neither
+
+
+def count_pairs(first: ArrayLike, second: ArrayLike) -> PairCounts:
+    """Count the pairs of two policies that flew the same episodes.
+
+    Args:
+        first: shape (n,), success of one policy, booleans or zeros and ones.
+        second: the same of the other, episode by episode.
+
+    Raises:
+        ValueError: an argument is empty or holds something else, or the shapes differ.
+    """
     one, other = _outcomes("first", first), _outcomes("second", second)
     if one.shape != other.shape:
         raise ValueError(f"second must have the shape of first, {one.shape}, got {other.shape}")
-    only_one, only_other = np.count_nonzero(one & ~other), np.count_nonzero(other & ~one)
-    if only_one + only_other == 0:
-        return 1.0
-    return float(binomtest(only_one, only_one + only_other).pvalue)
+    kinds = np.bincount(2 * one + other, minlength=4)  # neither, only second, only first, both
+    return PairCounts(*(int(kinds[k]) for k in (3, 2, 1, 0)))
+
+
+def mcnemar_count_p_value(pairs: PairCounts) -> float:
+    """The test of `mcnemar_p_value`, from counts."""
+    from scipy.stats import binomtest
+
+    discordant = pairs.only_first + pairs.only_second
+    return float(binomtest(pairs.only_first, discordant).pvalue) if discordant else 1.0
 
 
 def least_passing(episodes: int, reference_ratio: float, false_alarm: float = 1e-4) -> int:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import os
 import platform
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -73,9 +73,9 @@ class StudyFolder:
         """Where finished chunks are kept."""
         return self.path / "shards"
 
-    def read_chunks(self) -> tuple[list[Chunk], list[str]]:
-        """Every finished chunk, and what is wrong with those that must fly again (they are removed)."""
-        chunks, damages = [], []
+    def find_finished(self) -> tuple[set[tuple[int, int]], list[str]]:
+        """Bounds of every finished chunk, and what is wrong with those that must fly again (and go)."""
+        finished, damages = set(), []
         for first, last in chunk_bounds(self.study):
             path = shard_path(self.shards, first, last)
             if not path.exists():
@@ -84,11 +84,24 @@ class StudyFolder:
                 chunk, _ = read_shard(path)
                 if tuple(chunk.rows) != self.study.policies:
                     raise ShardError(f"{path} is damaged: it holds other policies")
-                chunks.append(chunk)
+                finished.add((first, last))
             except ShardError as error:
                 damages.append(str(error))
                 path.unlink()
-        return chunks, damages
+        return finished, damages
+
+    def read_chunks(self, policies: Collection[str] | None = None) -> Iterator[Chunk]:
+        """The chunks of the whole study in the order of their episodes, one at a time.
+
+        Args:
+            policies: only the rows of these; of all by default.
+
+        Raises:
+            ShardError: a shard is damaged.
+            OSError: one is missing.
+        """
+        for first, last in chunk_bounds(self.study):
+            yield read_shard(shard_path(self.shards, first, last), policies)[0]
 
     def store(self, chunk: Chunk) -> None:
         """Keep a finished chunk; when this returns, it is on the disk."""
@@ -99,7 +112,7 @@ class StudyFolder:
         sessions: dict[str, int] = {}
         retries = []
         for first, last in chunk_bounds(self.study):
-            chunk, session = read_shard(shard_path(self.shards, first, last))
+            chunk, session = read_shard(shard_path(self.shards, first, last), policies=())
             sessions[session] = sessions.get(session, 0) + last - first
             if chunk.attempts > 1:
                 retries.append({"episodes": [first, last - 1], "attempts": chunk.attempts})

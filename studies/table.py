@@ -3,24 +3,28 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
 
+from studies.histograms import DecisionTimes
+from studies.moments import mean_intervals
 from studies.paper import PAPER_ROWS
-from studies.rows import MEASURES, ROW_COLUMNS, EpisodeRow
-from studies.statistics import (
-    Interval,
-    bootstrap_mean,
-    clustered_interval,
-    mcnemar_p_value,
-    wilson_interval,
-)
+from studies.reliability import exact_lower_bound
+from studies.rows import MEASURES, RATIOS, ROW_COLUMNS, EpisodeRow
+from studies.scores import PolicyScore
+from studies.statistics import Interval, clustered_count_interval, mcnemar_count_p_value, wilson_interval
 
 REFERENCE_POLICY = "single-divert"
 """Every policy is compared with this one, on the same episodes."""
+
+AT_LEAST_CONFIDENCE = 0.9
+"""Confidence of "success in at least x %", as requirements of guidance are verified."""
+
+_ROWS_AT_ONCE = 5000  # rows of a group of the Parquet file
 
 
 @dataclass(frozen=True)
@@ -36,7 +40,9 @@ class PolicySummary:
         success: ratio of successes with Wilson's interval.
         success_by_tile: the same ratio with the interval clustered by tile.
         mcnemar_p: exact McNemar test of `safe_site` against the reference policy; nan for itself.
-        means: measure -> mean with its bootstrap interval.
+        success_at_least: exact one-sided lower bound of `success` at AT_LEAST_CONFIDENCE.
+        means: measure -> mean with Student's interval.
+        means_by_tile: measure -> the same mean with the interval clustered by tile.
         fallbacks: decisions in which the policy's own law gave no answer.
         privileged: it sees the true map.
     """
@@ -48,49 +54,37 @@ class PolicySummary:
     safe_site_by_tile: Interval
     success: Interval
     success_by_tile: Interval
+    success_at_least: float
     mcnemar_p: float
     means: dict[str, Interval]
+    means_by_tile: dict[str, Interval]
     fallbacks: int
     privileged: bool
 
 
-def summarize_policy(
-    rows: Sequence[EpisodeRow],
-    reference: Sequence[EpisodeRow],
-    preset: str,
-    study_seed: int,
-    privileged: bool,
-) -> PolicySummary:
-    """Score the rows of one policy against the reference policy's rows of the same episodes.
-
-    Raises:
-        ValueError: the episodes of the two differ.
-    """
-    if [row.episode for row in rows] != [row.episode for row in reference]:
-        raise ValueError("rows and reference must hold the same episodes in the same order")
-    safe = np.array([row.safe_site for row in rows])
-    success = np.array([row.success for row in rows])
-    tiles = np.array([row.tile for row in rows])
-    itself = rows[0].policy == reference[0].policy
-    means = {
-        name: bootstrap_mean(
-            np.array([getattr(row, name) for row in rows]), np.random.default_rng([study_seed, k])
-        )
-        for k, name in enumerate(MEASURES)
-    }
+def summarize_policy(score: PolicyScore, preset: str, privileged: bool, is_reference: bool) -> PolicySummary:
+    """The line of one policy."""
+    ratios, by_tile = {}, {}
+    for name in RATIOS:
+        successes, flown = score.count_successes(name)
+        ratios[name] = wilson_interval(int(successes.sum()), score.episodes)
+        by_tile[name] = clustered_count_interval(successes, flown)
+    moments = score.means.collect()
+    means = {name: mean_intervals(moments, k) for k, name in enumerate(MEASURES)}
+    successes = int(score.count_successes("success")[0].sum())
     return PolicySummary(
-        policy=rows[0].policy,
+        policy=score.policy,
         preset=preset,
-        episodes=len(rows),
-        safe_site=wilson_interval(int(safe.sum()), safe.size),
-        safe_site_by_tile=clustered_interval(safe, tiles),
-        success=wilson_interval(int(success.sum()), success.size),
-        success_by_tile=clustered_interval(success, tiles),
-        mcnemar_p=float("nan")
-        if itself
-        else mcnemar_p_value(safe, np.array([row.safe_site for row in reference])),
-        means=means,
-        fallbacks=sum(row.fallbacks for row in rows),
+        episodes=score.episodes,
+        safe_site=ratios["safe_site"],
+        safe_site_by_tile=by_tile["safe_site"],
+        success=ratios["success"],
+        success_by_tile=by_tile["success"],
+        success_at_least=exact_lower_bound(successes, score.episodes, AT_LEAST_CONFIDENCE),
+        mcnemar_p=float("nan") if is_reference else mcnemar_count_p_value(score.pairs["safe_site"]),
+        means={name: plain for name, (plain, _) in means.items()},
+        means_by_tile={name: tiled for name, (_, tiled) in means.items()},
+        fallbacks=score.fallbacks,
         privileged=privileged,
     )
 
@@ -110,7 +104,8 @@ def write_table(path: Path, summaries: Sequence[PolicySummary]) -> None:
     header += ["success_percent", "success_low", "success_high", "mcnemar_p"]
     header += [f"{name}{end}" for name in MEASURES for end in ("", "_low", "_high")]
     header += ["fallbacks", "privileged"]
-    header += [f"{name}_tile_{end}" for name in ("safe_site", "success") for end in ("low", "high")]
+    header += [f"{name}_tile_{end}" for name in (*RATIOS, *MEASURES) for end in ("low", "high")]
+    header.append("success_at_least")
     with path.open("w", newline="") as stream:
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(header)
@@ -122,47 +117,66 @@ def write_table(path: Path, summaries: Sequence[PolicySummary]) -> None:
                 cells += [_number(value) for value in (mean.estimate, mean.low, mean.high)]
             cells += [s.fallbacks, s.privileged]
             cells += _percent(s.safe_site_by_tile)[1:] + _percent(s.success_by_tile)[1:]
-            writer.writerow(cells)
+            for name in MEASURES:
+                cells += [_number(s.means_by_tile[name].low), _number(s.means_by_tile[name].high)]
+            writer.writerow([*cells, _number(100.0 * s.success_at_least)])
 
 
-def write_episodes(folder: Path, rows: Sequence[EpisodeRow]) -> None:
-    """Write the rows as episodes.csv and episodes.parquet; equal rows give equal CSV bytes."""
+def write_episodes(folder: Path, rows: Iterable[EpisodeRow]) -> None:
+    """Write rows as they come as episodes.csv and episodes.parquet; equal rows give equal CSV bytes."""
     import pyarrow as pa
     from pyarrow import parquet
 
-    with (folder / "episodes.csv").open("w", newline="") as stream:
+    kinds = {"str": pa.string(), "int": pa.int64(), "bool": pa.bool_(), "float": pa.float64()}
+    schema = pa.schema([(name, kinds[EpisodeRow.__annotations__[name]]) for name in ROW_COLUMNS])
+    with (
+        (folder / "episodes.csv").open("w", newline="") as stream,
+        parquet.ParquetWriter(folder / "episodes.parquet", schema) as tables,
+    ):
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(ROW_COLUMNS)
-        for row in rows:
-            values = (getattr(row, name) for name in ROW_COLUMNS)
-            writer.writerow([_number(v) if isinstance(v, float) else v for v in values])
-    columns = {name: [getattr(row, name) for row in rows] for name in ROW_COLUMNS}
-    parquet.write_table(pa.table(columns), folder / "episodes.parquet")
+        remaining = iter(rows)
+        while group := list(islice(remaining, _ROWS_AT_ONCE)):
+            for row in group:
+                values = (getattr(row, name) for name in ROW_COLUMNS)
+                writer.writerow([_number(v) if isinstance(v, float) else v for v in values])
+            columns = {name: [getattr(row, name) for row in group] for name in ROW_COLUMNS}
+            tables.write_table(pa.table(columns, schema=schema))
 
 
-def write_timings(path: Path, decision_time: dict[str, np.ndarray]) -> None:
+def write_timings(path: Path, decision_time: dict[str, DecisionTimes]) -> None:
     """Write how long decisions took; the only table that is not reproducible."""
     with path.open("w", newline="") as stream:
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(["policy", *(f"decision_time_ms_{q}" for q in ("p50", "p99", "max"))])
-        for policy, seconds in decision_time.items():
-            quantiles = 1000.0 * np.quantile(seconds, (0.5, 0.99, 1.0))
+        for policy, times in decision_time.items():
+            quantiles = [1000.0 * times.quantile(share) for share in (0.5, 0.99, 1.0)]
             writer.writerow([policy, *(f"{value:.4g}" for value in quantiles)])
 
 
 def write_markdown(path: Path, summaries: Sequence[PolicySummary]) -> None:
     """Write the table for a document: ratios with their intervals, means without."""
-    headings = ("policy", "safe site %", "success %", "miss m", "speed m/s", "propellant %", "slant deg")
+    headings = (
+        "policy",
+        "safe site %",
+        "success %",
+        "at least %",
+        "miss m",
+        "speed m/s",
+        "propellant %",
+        "slant deg",
+    )
     lines = ["| " + " | ".join((*headings, "thrust N", "fallbacks")) + " |"]
     lines.append("|---|" + "---:|" * (len(headings) + 1))
     shown = [name for name in MEASURES if name != "reward"]
     for s in summaries:
         name = s.policy + (" *" if s.privileged else "")
         cells = [name, _ratio(s.safe_site, s.safe_site_by_tile), _ratio(s.success, s.success_by_tile)]
+        cells.append(f"{100.0 * s.success_at_least:.2f}")
         cells += [f"{s.means[name].estimate:.{_digits(name)}f}" for name in shown]
         lines.append("| " + " | ".join([*cells, str(s.fallbacks)]) + " |")
     for name, row in PAPER_ROWS.items():
-        cells = [f"*the paper: {name}*", f"{row['safe_site_percent']:.1f}", ""]
+        cells = [f"*the paper: {name}*", f"{row['safe_site_percent']:.1f}", "", ""]
         cells += [f"{row[measure]:.{_digits(measure)}f}" for measure in shown]
         lines.append("| " + " | ".join([*cells, ""]) + " |")
     path.write_text("\n".join(lines) + "\n")
@@ -184,9 +198,23 @@ def print_table(summaries: Sequence[PolicySummary]) -> None:
 
     first = summaries[0]
     title = f"preset {first.preset}, {first.episodes} episodes (mean, 95 % interval; [] clustered by tile)"
-    table = Table(title=title, caption="* sees the true map; p: exact McNemar against single-divert")
+    caption = (
+        "* sees the true map; p: exact McNemar against single-divert;"
+        f" at least: success, exact bound at {AT_LEAST_CONFIDENCE:.0%}"
+    )
+    table = Table(title=title, caption=caption)
     table.add_column("policy", no_wrap=True)
-    headings = ("safe site %", "success %", "p", "miss m", "speed m/s", "prop. %", "slant deg", "thrust N")
+    headings = (
+        "safe site %",
+        "success %",
+        "at least",
+        "p",
+        "miss m",
+        "speed m/s",
+        "prop. %",
+        "slant deg",
+        "thrust N",
+    )
     for heading in (*headings, "reward", "fallb."):
         table.add_column(heading, justify="right")
     for s in summaries:
@@ -194,8 +222,10 @@ def print_table(summaries: Sequence[PolicySummary]) -> None:
     table.add_section()
     for name, row in PAPER_ROWS.items():
         cells = [f"{row[m]:.4g}" if m in row else "" for m in MEASURES]
-        table.add_row(f"paper: {name}", f"{row['safe_site_percent']:.1f}", "", "", *cells, "", style="dim")
-    Console(width=max(Console().width, 146)).print(table)
+        table.add_row(
+            f"paper: {name}", f"{row['safe_site_percent']:.1f}", "", "", "", *cells, "", style="dim"
+        )
+    Console(width=max(Console().width, 156)).print(table)
 
 
 def _printed_cells(summary: PolicySummary) -> list[str]:
@@ -207,6 +237,7 @@ def _printed_cells(summary: PolicySummary) -> list[str]:
         summary.policy + (" *" if summary.privileged else ""),
         ratio(summary.safe_site, summary.safe_site_by_tile),
         ratio(summary.success, summary.success_by_tile),
+        f"{100.0 * summary.success_at_least:.2f}",
         "" if np.isnan(p) else ("<1e-4" if p < 1e-4 else f"{p:.2g}"),
     ]
     for name in MEASURES:

@@ -8,8 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from studies.monte_carlo import Chunk
 from studies.paired import compare_pairs, holm_adjust, paired_ratio_interval, write_paired
 from studies.rows import MEASURES, EpisodeRow
+from studies.scores import StudyScores, score_study
 
 
 def pairs(both: int, only_one: int, only_other: int, neither: int) -> tuple[np.ndarray, np.ndarray]:
@@ -106,19 +108,23 @@ def rows(policy: str, safe: np.ndarray, speed: float) -> list[EpisodeRow]:
     ]
 
 
+def scored(reference: np.ndarray, other: np.ndarray) -> StudyScores:
+    both = {"single-divert": rows("single-divert", reference, 1.0), "other": rows("other", other, 0.75)}
+    chunk = Chunk(0, reference.size, both, {name: np.ones(3) for name in both})
+    return score_study(tuple(both), "single-divert", [chunk])
+
+
 def test_differences_are_those_of_the_rows(tmp_path) -> None:
     rng = np.random.default_rng(1)
     first, second = rng.random(80) < 0.7, rng.random(80) < 0.9
-    reference = rows("single-divert", first, 1.0)
-    found = compare_pairs(
-        {"single-divert": reference, "other": rows("other", second, 0.75)}, reference, study_seed=0
-    )
+    found = compare_pairs(scored(first, second), ["single-divert", "other"])
     assert [difference.policy for difference in found] == ["other"]
     assert found[0].ratios["safe_site"] == paired_ratio_interval(second, first)
     speed = found[0].means["touchdown_speed_mps"]
     assert (speed.low, speed.estimate, speed.high) == (-0.25, -0.25, -0.25)
     assert found[0].holm_p == found[0].mcnemar_p
     write_paired(tmp_path / "paired.csv", found)
+    assert found[0].means_by_tile["touchdown_speed_mps"].low == -math.inf  # one tile
     with (tmp_path / "paired.csv").open() as stream:
         line = next(csv.DictReader(stream))
     assert float(line["safe_site_points"]) == pytest.approx(100.0 * (second.mean() - first.mean()))
@@ -126,6 +132,5 @@ def test_differences_are_those_of_the_rows(tmp_path) -> None:
 
 
 def test_other_episodes_are_refused() -> None:
-    reference = rows("single-divert", np.ones(5), 1.0)
     with pytest.raises(ValueError, match="'other' and 'single-divert' must have flown the same episodes"):
-        compare_pairs({"other": rows("other", np.ones(4), 1.0)}, reference, 0)
+        scored(np.ones(5), np.ones(4))

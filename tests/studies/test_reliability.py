@@ -6,7 +6,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.special import betaincinv
 
-from studies.reliability import allowed_failures, exact_interval, needed_episodes, order_bound
+from studies.reliability import (
+    allowed_failures,
+    exact_interval,
+    exact_lower_bound,
+    needed_episodes,
+    order_bound,
+)
 
 
 @pytest.mark.parametrize(
@@ -52,6 +58,20 @@ def test_the_exact_interval_covers_at_least_what_it_says(episodes: int, ratio: f
         interval = exact_interval(hits, episodes)
         covered += float(binom.pmf(hits, episodes, ratio)) * (interval.low <= ratio <= interval.high)
     assert covered >= 0.95
+
+
+@pytest.mark.parametrize(("episodes", "ratio"), [(20, 0.9), (300, 0.98), (1000, 0.9973)])
+def test_the_lower_bound_holds_as_often_as_it_says(episodes: int, ratio: float) -> None:
+    """Summed over every count with its probability; it is also the share that so many failures still show."""
+    from scipy.stats import binom
+
+    bounds = [exact_lower_bound(hits, episodes, 0.9) for hits in range(episodes + 1)]
+    chances = binom.pmf(np.arange(episodes + 1), episodes, ratio)
+    assert chances[np.array(bounds) <= ratio].sum() >= 0.9
+    for failures in (0, 1, 5):
+        bound = bounds[episodes - failures]
+        assert allowed_failures(episodes, bound - 1e-9, 0.9) == failures
+        assert (allowed_failures(episodes, bound + 1e-6, 0.9) or -1) < failures
 
 
 def test_order_bounds_cover_as_they_say() -> None:

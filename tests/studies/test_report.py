@@ -28,9 +28,10 @@ from studies.flights import (
     pack_levels,
     picture_ground,
 )
-from studies.monte_carlo import Study
+from studies.monte_carlo import Chunk, Study
 from studies.report import script_json
 from studies.rows import EpisodeRow
+from studies.scores import score_study
 
 POLICIES = ("no-divert", "single-divert", "nearest-safe", "oracle")
 EPISODES = 24
@@ -158,7 +159,9 @@ def test_few_flights_are_chosen_and_each_kind_of_failure_is_among_them(
     ends = st.sampled_from(["success", "unsafe-site", "crash", "hard-landing"])
     outcomes = data.draw(st.lists(ends, min_size=episodes, max_size=episodes))
     rows = [made_row(name, k, outcomes[k]) for name in names for k in range(episodes)]
-    chosen = choose_flights(rows, names)
+    own = {name: [row for row in rows if row.policy == name] for name in names}
+    chunk = Chunk(0, episodes, own, {name: np.ones(1) for name in names})
+    chosen = choose_flights(score_study(names, names[0], [chunk]), names)
     assert len(set(chosen)) == len(chosen) <= MOST_FLIGHTS
     for name in names:
         own = [episode for policy, episode in chosen if policy == name]

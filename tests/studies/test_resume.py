@@ -17,7 +17,8 @@ import pytest
 from hda.presets import PRESETS
 from studies import monte_carlo
 from studies.compare import Comparison, compare
-from studies.monte_carlo import Chunk, Study, WorkerDiedError, chunk_bounds, fly_chunk, fly_chunks
+from studies.executor import WorkerDiedError
+from studies.monte_carlo import Chunk, Study, chunk_bounds, fly_chunk, fly_chunks
 from studies.study_folder import Existing, FolderError, StudyFolder, open_study_folder
 
 POLICIES = ("no-divert", "single-divert")
@@ -213,7 +214,7 @@ def test_one_writer_at_a_time_and_a_dead_one_is_forgotten(tmp_path: Path) -> Non
         holder.communicate()
     assert (tmp_path / ".owner").exists()  # it had no time to clean up
     with open_study_folder(tmp_path, STUDY, Existing.RESUME) as folder:
-        assert folder.read_chunks() == ([], [])
+        assert folder.find_finished() == (set(), [])
 
 
 def test_a_dead_worker_costs_a_retry_and_is_labelled(

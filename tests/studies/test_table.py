@@ -1,12 +1,16 @@
 """The table is a pure function of rows, and its bytes are a pure function of its summaries."""
 
 import csv
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from studies.monte_carlo import Chunk
+from studies.reliability import exact_lower_bound
 from studies.rows import MEASURES, EpisodeRow
+from studies.scores import score_study
 from studies.statistics import clustered_interval, mcnemar_p_value, wilson_interval
 from studies.table import PolicySummary, summarize_policy, write_episodes, write_table
 
@@ -37,14 +41,22 @@ def make_rows(policy: str, safe: np.ndarray) -> list[EpisodeRow]:
     ]
 
 
+def chunks_of(rows: dict[str, list[EpisodeRow]], size: int) -> Iterator[Chunk]:
+    count = len(next(iter(rows.values())))
+    for first in range(0, count, size):
+        own = {name: whole[first : first + size] for name, whole in rows.items()}
+        yield Chunk(first, min(first + size, count), own, {name: np.full(3, 0.001) for name in rows})
+
+
 @pytest.fixture
 def summaries() -> list[PolicySummary]:
     rng = np.random.default_rng(3)
     first, second = rng.random(60) < 0.8, rng.random(60) < 0.95
-    reference = make_rows("single-divert", first)
+    rows = {"single-divert": make_rows("single-divert", first), "other": make_rows("other", second)}
+    scores = score_study(tuple(rows), "single-divert", chunks_of(rows, 7))
     return [
-        summarize_policy(reference, reference, "paper", 0, False),
-        summarize_policy(make_rows("other", second), reference, "paper", 0, True),
+        summarize_policy(scores.policies["single-divert"], "paper", False, is_reference=True),
+        summarize_policy(scores.policies["other"], "paper", True, is_reference=False),
     ]
 
 
@@ -58,6 +70,24 @@ def test_ratios_and_test_are_those_of_the_rows(summaries: list[PolicySummary]) -
     assert np.isnan(summaries[0].mcnemar_p)
     assert summaries[1].success.estimate == np.mean(second & (np.arange(60) % 3 != 0))
     assert summaries[1].fallbacks == 30
+    successes = int((second & (np.arange(60) % 3 != 0)).sum())
+    assert summaries[1].success_at_least == exact_lower_bound(successes, 60, 0.9)
+
+
+def test_means_are_those_of_the_rows(summaries: list[PolicySummary]) -> None:
+    from scipy.stats import t
+
+    rows = make_rows("other", np.ones(60))
+    tiles = np.array([row.tile for row in rows])
+    for name in MEASURES:
+        values = np.array([getattr(row, name) for row in rows])
+        mean, by_tile = summaries[1].means[name], summaries[1].means_by_tile[name]
+        assert mean.estimate == pytest.approx(values.mean(), rel=1e-13)
+        half = t.ppf(0.975, 59) * values.std(ddof=1) / np.sqrt(60)
+        assert (mean.low, mean.high) == pytest.approx((values.mean() - half, values.mean() + half))
+        totals = np.array([(values[tiles == tile] - values.mean()).sum() for tile in np.unique(tiles)])
+        variance = max(values.var(ddof=1) / 60, 4 / 3 * (totals**2).sum() / 60**2)
+        assert by_tile.high - by_tile.estimate == pytest.approx(t.ppf(0.975, 3) * np.sqrt(variance))
 
 
 def test_means_hold_their_interval(summaries: list[PolicySummary]) -> None:
@@ -95,4 +125,4 @@ def test_unequal_episodes_are_refused() -> None:
     rows = make_rows("other", np.ones(10, dtype=bool))
     moved = [replace(row, episode=row.episode + 1) for row in make_rows("single-divert", np.ones(10))]
     with pytest.raises(ValueError, match="same episodes"):
-        summarize_policy(rows, moved, "paper", 0, False)
+        score_study(("other",), "single-divert", chunks_of({"other": rows, "single-divert": moved}, 5))
