@@ -297,7 +297,8 @@ def read_rows(path: Path) -> list[dict[str, str]]:
         return []
     rows: list[dict[str, str]] = []
     try:
-        lines = path.read_text().splitlines(keepends=True)
+        with path.open(newline="") as file:
+            lines = file.read().splitlines(keepends=True)
         if lines and not lines[-1].endswith("\n"):
             lines.pop()  # a killed process was writing it
         for row in csv.DictReader(lines, strict=True):
