@@ -2,7 +2,7 @@
 
 import math
 import tracemalloc
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import pytest
@@ -106,11 +106,20 @@ def test_no_time_and_a_strange_one_are_no_crash() -> None:
     assert times.quantile(1.0) == 1e9
 
 
+def made_row(
+    policy: str, episode: int, ok: bool, tile: int = 1000, values: Sequence[float] = (0.0,) * 6
+) -> EpisodeRow:
+    measures = dict(zip(MEASURES, values, strict=True))
+    rest = {"flight_time_s": 40.0, "touchdown_x_m": 0.0, "touchdown_y_m": 0.0}
+    outcome = "success" if ok else "crash"
+    return EpisodeRow(policy, episode, tile, outcome, ok, ok, decisions=8, fallbacks=0, **measures, **rest)
+
+
 def made_rows(policy: str, first: int, last: int) -> list[EpisodeRow]:
     rng = np.random.default_rng([first, len(policy)])
     safe = rng.random(last - first) < 0.9
     return [
-        EpisodeRow(policy, k, 1000 + k % 18, "" if ok else "crash", ok, ok, *rng.random(6), 40.0, 8, 0, 0, 0)
+        made_row(policy, k, ok, 1000 + k % 18, rng.random(6).tolist())
         for k, ok in zip(range(first, last), safe.tolist(), strict=True)
     ]
 
@@ -173,14 +182,11 @@ def test_the_hardest_episode_is_kept_with_the_first() -> None:
     """Fewest land it safely, but some do; the earlier of two."""
     safe = {"a": [1, 1, 0, 1, 0], "b": [1, 0, 0, 0, 0], "c": [1, 1, 0, 0, 1]}
 
-    def row(name: str, k: int, ok: int) -> EpisodeRow:
-        return EpisodeRow(name, k, 1000, "", bool(ok), bool(ok), *[0.0] * 7, 8, 0, 0, 0)
-
-    rows = {name: [row(name, k, ok) for k, ok in enumerate(each)] for name, each in safe.items()}
+    rows = {name: [made_row(name, k, bool(ok)) for k, ok in enumerate(each)] for name, each in safe.items()}
     scores = score_study(tuple(safe), "a", [Chunk(0, 5, rows, {name: np.ones(1) for name in safe})])
     assert scores.hardest == 3
     assert sorted(scores.shared) == [0, 3]
-    assert scores.policies["b"].failures[""] == (4, [1, 2, 3, 4])
+    assert scores.policies["b"].failures["crash"] == (4, [1, 2, 3, 4])
 
 
 def test_nothing_flown_is_refused() -> None:
