@@ -102,7 +102,7 @@ def measure_scale(options: Scale) -> list[Measurement]:
             finite_number(name, value, at_least=1)
     policy = policy_entry(options.policy).name
     measured = []
-    console = Console()
+    console = Console(width=max(Console().width, 110))
     with console.status("measuring") as status:
         for episodes in options.episodes:
             for workers in options.workers:
