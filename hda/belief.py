@@ -59,7 +59,9 @@ class SafetyBelief:
         return self.looks > 0
 
     def fused(self, observation: Observation, lidar: Lidar) -> SafetyBelief:
-        """The belief after one more look."""
+        """The belief after one more look; itself if the look has no map."""
+        if not observation.has_map:
+            return self
         log_likelihood, looks = self.log_likelihood.copy(), self.looks.copy()
         target = observation.target
         _fuse_into(

@@ -55,15 +55,15 @@ def count_surroundings(
 
 
 def measure() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Level shares and the safe-share table, over both presets' training tiles.
+    """Level shares and the safe-share table, over the training tiles of each ground that presets use.
 
     Pairs of classes that never occur take the value of pairs with the same quotient of distances: one half.
     """
     classes = DISTANCE_EDGES.size + 1
     cells, good = np.zeros((classes, classes)), np.zeros((classes, classes))
     levels = np.zeros(LEVELS.size)
-    for preset in PRESETS.values():
-        ground, rng = Ground(preset.terrain, preset.criteria), np.random.default_rng(0)
+    for ground in dict.fromkeys(Ground(preset.terrain, preset.criteria) for preset in PRESETS.values()):
+        rng = np.random.default_rng(0)
         for number in TILES:
             tile = load_tile(ground, number, "train")
             levels += level_shares(tile.probability[_BORDER:-_BORDER, _BORDER:-_BORDER])

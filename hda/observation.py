@@ -61,6 +61,11 @@ class Observation:
     time_to_go: float
 
     @property
+    def has_map(self) -> bool:
+        """Whether any ground was seen: a look that came without a map reads 0 everywhere."""
+        return bool(self.safety_map.any())
+
+    @property
     def pixel_size(self) -> float:
         """[m] side of one pixel."""
         return self.width / self.safety_map.shape[0]

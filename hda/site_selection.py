@@ -77,8 +77,8 @@ class SingleDivertSite:
         return False
 
     def select(self, observation: Observation, memory: bool) -> tuple[Site, bool]:
-        """Divert at the first look that is low enough."""
-        if memory or observation.state.position[2] > self.divert_altitude:
+        """Divert at the first look that is low enough and has a map."""
+        if memory or observation.state.position[2] > self.divert_altitude or not observation.has_map:
             return observation.target, memory
         return safest_site(observation), True
 
@@ -100,7 +100,9 @@ class NearestSafeSite:
         return False
 
     def select(self, observation: Observation, memory: bool) -> tuple[Site, bool]:
-        """Select at the first look; afterwards only when the site no longer looks safe."""
+        """Select at the first look with a map; afterwards only when the site no longer looks safe."""
+        if not observation.has_map:
+            return observation.target, memory
         if memory and observed_safety(observation, observation.target) >= self.keep_threshold:
             return observation.target, True
         site = nearest_safe_site(observation, self.select_threshold)
