@@ -165,6 +165,7 @@ class RecurrentTD3:
         self.critic_optimizer = torch.optim.Adam(self.critic.parameters(), lr=rate, fused=True)
         self.replay_buffer = EpisodeReplay(settings.replay_size, size.observation, size.action)
         self.rng = np.random.default_rng(seed)
+        self.action_space.seed(seed)
         self.num_timesteps = self._n_updates = self._episode_num = 0
         self.logger: Any = None
         # the episode under way
