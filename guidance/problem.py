@@ -12,6 +12,9 @@ from guidance.lander import Lander
 from guidance.state import State
 from guidance.validation import finite_number, finite_vector
 
+LARGEST_NUMBER = 1e9
+"""No distance, speed or mass of a powered descent is larger; far beyond it, their powers overflow."""
+
 
 @dataclass(frozen=True, eq=False)
 class LandingProblem:
@@ -27,8 +30,8 @@ class LandingProblem:
         speed_limit: [m/s] greatest speed; None for none.
 
     Raises:
-        ValueError: an argument is out of range or not finite, the start lies below the target's altitude, or
-            its mass does not exceed the dry mass.
+        ValueError: an argument is out of range or not finite, the start lies below the target's altitude,
+            its mass does not exceed the dry mass, or a number is beyond 1e9.
     """
 
     state: State
@@ -46,6 +49,10 @@ class LandingProblem:
             object.__setattr__(self, name, vector)
         if not isinstance(self.lander, Lander):
             raise ValueError(f"lander must be a Lander, got {self.lander!r}")
+        numbers = (("state", self.state.as_array()), ("target", self.target), ("gravity", self.gravity))
+        for name, vector in numbers:
+            if np.abs(vector).max() > LARGEST_NUMBER:
+                raise ValueError(f"{name}: no number may exceed {LARGEST_NUMBER:g}, got {vector.tolist()}")
         if self.state.mass <= self.lander.dry_mass:
             raise ValueError(
                 f"state: mass {self.state.mass:g} kg must exceed the dry mass {self.lander.dry_mass:g} kg"
