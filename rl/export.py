@@ -1,4 +1,4 @@
-"""From runs to shipped weights: choose seed and checkpoint on the tuning tiles, then fly validation once."""
+"""From runs to shipped weights: choose seed and weights on the tuning tiles, then fly validation once."""
 
 from __future__ import annotations
 
@@ -9,47 +9,31 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
-from rl.artefacts import WEIGHTS_FOLDER, Tensors
+from rl.artefacts import WEIGHTS_FOLDER
+from rl.candidates import CHOICE_SEED, Candidate, Choice, best_of_run
 
 if TYPE_CHECKING:
     from hda.scenario import Preset
     from rl.algorithms import AgentSettings
-    from rl.scoring import Score
-
-CHOICE_SEED = 900_001
-"""Study seed of the choice, on the tuning tiles; not that of the periodic validation."""
 
 
 @dataclass(frozen=True)
 class ExportWeights:
-    """Make shipped weights from runs: the best checkpoint of the best seed, judged on the tuning tiles.
+    """Make shipped weights from runs: the best of the best seed, judged on the tuning tiles.
 
     Attributes:
         runs: folders of runs with equal settings and different seeds.
         name: of the weights: NAME.safetensors and NAME.json.
-        candidates: best checkpoints of each run, by its own validation, that are flown again.
-        episodes: tuning episodes that each candidate flies.
+        choice: how the weights are chosen.
         validation_episodes: episodes on the validation tiles, flown once, for the card.
         out: folder.
     """
 
     runs: tuple[Path, ...]
     name: str
-    candidates: int = 5
-    episodes: int = 1000
+    choice: Annotated[Choice, tyro.conf.arg(name="")] = field(default_factory=Choice)
     validation_episodes: int = 1000
     out: Annotated[Path, tyro.conf.arg(metavar="DIR")] = field(default=WEIGHTS_FOLDER)
-
-
-@dataclass(frozen=True, eq=False)
-class Candidate:
-    """A checkpoint's actor and how it flew the tuning tiles."""
-
-    run: Path
-    seed: int
-    step: int
-    tensors: Tensors
-    score: Score
 
 
 def settings_from_json(values: dict[str, Any]) -> AgentSettings:
@@ -74,36 +58,10 @@ def training_command(card: dict[str, Any], seed: int) -> str:
     return " ".join(parts)
 
 
-def best_of_run(
-    run: Path, preset: Preset, settings: AgentSettings, options: ExportWeights, seed: int
-) -> Candidate:
-    """Fly the most promising checkpoints of one run again, on more tuning episodes; give the best.
-
-    Raises:
-        ValueError: the run has no validated checkpoint.
-    """
-    from rl.actor_export import policy_of
-    from rl.artefacts import load_artefact
-    from rl.scoring import score_policy
-    from rl.training import read_rows
-
-    rows = read_rows(run / "validation.csv")
-    if not rows:
-        raise ValueError(f"{run} has no validated checkpoint")
-    rows.sort(key=lambda row: (float(row["success_percent"]), float(row["reward"])), reverse=True)
-    found = []
-    for row in rows[: options.candidates]:
-        step = int(row["step"])
-        tensors = load_artefact(run / "actors" / f"step-{step:09d}", "actor").tensors
-        score = score_policy(policy_of(tensors, settings), preset, "tuning", CHOICE_SEED, options.episodes)
-        found.append(Candidate(run, seed, step, tensors, score))
-    return max(found, key=lambda candidate: candidate.score.rank)
-
-
 def validate(
     candidate: Candidate, preset: Preset, settings: AgentSettings, options: ExportWeights
 ) -> dict[str, Any]:
-    """Fly a chosen checkpoint on the validation tiles; give its scores for the card."""
+    """Fly chosen weights on the validation tiles; give its scores for the card."""
     from rl.actor_export import policy_of
     from rl.scoring import score_policy
 
@@ -111,7 +69,7 @@ def validate(
     score = score_policy(policy, preset, "validation", 0, options.validation_episodes)
     return {
         "seed": candidate.seed,
-        "step": candidate.step,
+        "steps": list(candidate.steps),
         "tuning": candidate.score.as_dict(),
         "validation": score.as_dict(),
     }
@@ -141,8 +99,8 @@ def run_export(options: ExportWeights) -> None:
         prepare_tiles(Ground(preset.terrain, preset.criteria), split)
     best = []
     for run, card in zip(options.runs, cards, strict=True):
-        best.append(best_of_run(run, preset, settings, options, card["seed"]))
-        console.print(f"{run}: step {best[-1].step}, {best[-1].score.as_dict()}")
+        best.append(best_of_run(run, card["seed"], preset, settings, options.choice))
+        console.print(f"{run}: steps {best[-1].steps}, {best[-1].score.as_dict()}")
     chosen = max(best, key=lambda candidate: candidate.score.rank)
     seeds = [validate(candidate, preset, settings, options) for candidate in best]
     for scores in seeds:
@@ -159,7 +117,7 @@ def run_export(options: ExportWeights) -> None:
         "splits": {"learning": "train", "choice": "tuning", "report": "validation"},
         "tuning_seeds": [TUNING_SEED, CHOICE_SEED],
         "seed": chosen.seed,
-        "step": chosen.step,
+        "steps": list(chosen.steps),
         "seeds": seeds,
         "curve": curve,
         "versions": library_versions(),

@@ -5,11 +5,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis.extra.numpy import arrays
+from hypothesis.strategies import floats
 
 from hda.episode import fly
 from hda.presets import PRESETS, sample_scenario
 from rl.algorithms import RECIPES
 from rl.artefacts import load_artefact
+from rl.candidates import Choice, average_tensors
 from rl.export import ExportWeights, run_export
 from rl.figures import GainsFigure, TrainingFigure, draw_gains, draw_training, moving_average
 from rl.policy import AgentPolicy
@@ -30,22 +34,38 @@ def runs(tmp_path_factory):
 
 
 def test_exported_weights_fly_and_tell_where_they_came_from(runs, tmp_path):
-    run_export(
-        ExportWeights(runs, "sac", candidates=2, episodes=2, validation_episodes=2, out=tmp_path / "weights")
-    )
+    choice = Choice(averages=(1, 2), candidates=2, episodes=2)
+    run_export(ExportWeights(runs, "sac", choice, validation_episodes=2, out=tmp_path / "weights"))
     artefact = load_artefact(tmp_path / "weights" / "sac", "actor")
     training = artefact.card["training"]
     assert [seed["seed"] for seed in training["seeds"]] == [0, 1]
     assert training["command"].startswith(f"python -m rl.train sac --seed {training['seed']} --preset paper")
     assert "--hidden 8 8" in training["command"]
     assert "--learning-rate" not in training["command"]
-    chosen = runs[training["seed"]] / "actors" / f"step-{training['step']:09d}"
-    for name, tensor in load_artefact(chosen, "actor").tensors.items():
-        np.testing.assert_array_equal(artefact.tensors[name], tensor)
+    folder = runs[training["seed"]] / "actors"
+    actors = [load_artefact(folder / f"step-{step:09d}", "actor").tensors for step in training["steps"]]
+    for name, tensor in artefact.tensors.items():
+        expected = sum(np.asarray(actor[name], np.float64) for actor in actors) / len(actors)
+        np.testing.assert_allclose(tensor, expected, atol=1e-6)
     best = max(training["seeds"], key=lambda s: (s["tuning"]["success_percent"], s["tuning"]["reward"]))
     assert best["seed"] == training["seed"]
     record = fly(AgentPolicy("sac", tmp_path / "weights" / "sac"), sample_scenario("paper", 8, 0, "train"))
     assert len(record.decisions) >= 1
+
+
+@given(arrays(np.float32, (4, 3), elements=floats(-10, 10, width=32)))
+def test_the_mean_of_actors_is_the_mean_of_each_weight(weights):
+    mean = average_tensors([{"bias": row, "twice": 2 * row} for row in weights])
+    np.testing.assert_allclose(mean["bias"], weights.mean(0), atol=1e-5)
+    np.testing.assert_allclose(mean["twice"], 2 * mean["bias"], atol=1e-5)
+    np.testing.assert_array_equal(average_tensors([{"bias": weights[0]}])["bias"], weights[0])
+
+
+def test_actors_of_different_kinds_are_not_averaged():
+    with pytest.raises(ValueError, match="one kind"):
+        average_tensors([{"bias": np.zeros(1)}, {"weight": np.zeros(1)}])
+    with pytest.raises(ValueError, match="one kind"):
+        average_tensors([])
 
 
 def test_runs_that_do_not_belong_together_are_refused(runs, tmp_path):
