@@ -206,7 +206,7 @@ def write_levels(path: Path, sweep: Sweep, study_seed: int) -> None:
 
 def write_level_markdown(path: Path, sweep: Sweep) -> None:
     """Write the successes of a factor for a document: a line per policy, a column per level."""
-    levels = [f"**{level:g}**" if level == sweep.own else f"{level:g}" for level in sweep.levels]
+    levels = [f"**{level:.4g}**" if level == sweep.own else f"{level:.4g}" for level in sweep.levels]
     lines = [f"{sweep.factor.label}: success %, Wilson's 95 % interval; the preset's own value is bold", ""]
     lines += ["| policy | " + " | ".join(levels) + " |", "|---|" + "---:|" * len(levels)]
     for policy in sweep.levels[sweep.own]:
