@@ -3,6 +3,9 @@
 The state of a stage is (r, v, ln m, u), with the time of flight T where that is free; its control is u at the
 next node. fatrop reads this structure from the order of variables and constraints: each stage states the
 motion to the next one first, as x_next - f(x, control). IPOPT takes any order.
+
+`python -m studies.timing`: IPOPT takes 2.8 times as long as fatrop at free time and 2.4 times at fixed time;
+fatrop alone solves 45 of 47 cases, IPOPT all.
 """
 
 from __future__ import annotations
