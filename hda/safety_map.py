@@ -68,8 +68,7 @@ class SafetyMap:
             between the pads lies everywhere below it.
 
     Where the lander does not fit on the map, or the map has a hole under a pad or inside the footprint, a
-    cell is
-    unsafe: False, 0, NaN and NaN.
+    cell is unsafe: False, 0, NaN and NaN.
     """
 
     deterministic: NDArray[np.bool_]
@@ -109,8 +108,7 @@ def assess_safety(
 
     Raises:
         ValueError: an argument is out of range, `dem` is not two-dimensional, holds infinities or is smaller
-        than the
-            lander, or the lander is too small for the pixel size.
+            than the lander, or the lander is too small for the pixel size.
     """
     criteria = SafetyCriteria(footprint_diameter, pad_diameter, max_slope, max_roughness, range_noise)
     pixel_size = finite_number("pixel_size", pixel_size, above=0.0)

@@ -106,7 +106,7 @@ def load_artefact(path: Path, kind: str) -> Artefact:
 
     Raises:
         ArtefactError: a file is missing, cannot be read, is of another kind or format, or does not match
-        its card.
+            its card.
     """
     from safetensors import SafetensorError
     from safetensors.numpy import load

@@ -157,7 +157,7 @@ class ReconstructionError:
         mean_square: mean squared error of a pixel.
         variance_left: squared error over the variance of the pixels: 0 is perfect, 1 knows only the mean.
         center_mean_square: the same as `mean_square` over the middle quarter, where a target can move at
-        once.
+            once.
     """
 
     mean_square: float
