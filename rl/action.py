@@ -14,6 +14,8 @@ from hda.scenario import Range
 
 ACTION_NAMES = ("position_gain", "velocity_gain", "time_to_go_step", "shift_x", "shift_y")
 """What each element of the action moves, in order."""
+CONTROLS = ACTION_NAMES.index("shift_x")
+"""So many elements move the gains and the clock, the rest the target."""
 
 
 @dataclass(frozen=True)

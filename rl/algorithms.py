@@ -40,6 +40,8 @@ class AgentSettings:
             only; see `rl.td3.FastTD3`).
         prior_weight: of the penalty that draws an actor to the nominal action where the critic sees no
             difference (td3 only; see `rl.td3.FastTD3`).
+        control_prior_weight: of such a penalty on the gains and the clock alone (td3 only).
+        control_prior_step: environment step from which it holds: first free, then settled.
         smoothing_share: the target actor's actions are smoothed by this share of the exploration noise, at
             most 0.2; None is 0.2 throughout (td3 and those with memory; see `rl.td3.FastTD3`).
         return_bounds: target values are clipped to them (td3 and those with memory); no landing returns more
@@ -64,6 +66,8 @@ class AgentSettings:
     noise_decay: tuple[int, int] = (40_000, 120_000)
     saturation_weight: float = 0.1
     prior_weight: float = 0.01
+    control_prior_weight: float = 0.2
+    control_prior_step: int = 165_000
     smoothing_share: float | None = 0.5
     return_bounds: tuple[float, float] | None = (-20.0, 1.0)
     random_steps: int = 20_000
@@ -83,6 +87,10 @@ class AgentSettings:
     def noise_at(self, step: int) -> float:
         """Standard deviation of the exploration noise at an environment step."""
         return _decayed(step, self.exploration_noise, self.final_noise, self.noise_decay)
+
+    def control_prior_at(self, step: int) -> float:
+        """Weight of the penalty that draws the gains and the clock to their nominal values."""
+        return self.control_prior_weight if step >= self.control_prior_step else 0.0
 
     def smoothing_noise_at(self, step: int) -> float:
         """Standard deviation of the noise on the target actor's actions at an environment step."""
@@ -141,6 +149,7 @@ RECIPES: dict[str, AgentSettings] = {
         final_noise=0.1,
         saturation_weight=0.0,
         prior_weight=0.0,
+        control_prior_weight=0.0,
         smoothing_share=None,
         return_bounds=None,
         random_steps=25_000,
@@ -209,6 +218,7 @@ def make_algorithm(settings: AgentSettings, env: Any, seed: int) -> OffPolicyAlg
     if isinstance(algorithm, FastTD3):
         algorithm.saturation_weight = settings.saturation_weight
         algorithm.prior_weight = settings.prior_weight
+        algorithm.control_prior = lambda: settings.control_prior_at(algorithm.num_timesteps)
         algorithm.smoothing_noise = lambda: settings.smoothing_noise_at(algorithm.num_timesteps)
         algorithm.return_bounds = settings.return_bounds
     if settings.algorithm in ("td3", "ddpg"):

@@ -16,6 +16,8 @@ from stable_baselines3 import TD3
 from stable_baselines3.common.noise import ActionNoise
 from torch.nn.functional import mse_loss
 
+from rl.action import CONTROLS
+
 
 class ScheduledNoise(ActionNoise):
     """Gaussian noise on the five elements of an action, from NumPy's global generator as all of SB3."""
@@ -40,6 +42,9 @@ class FastTD3(TD3):
         saturation_bound: 1.5 lets actions reach 0.905 without a penalty.
         prior_weight: weight of the actor's penalty for the squares of those inputs. Where the critic sees no
             difference it draws actions to 0, which keeps the target, the gains 6/2 and the clock.
+        control_prior: asked at each update for the weight of one more such penalty, on all elements but the
+            shift of the target. A critic of landings that end in +1, -1 or -10 errs by more than the gains
+            are worth, and an actor that follows its errors lands hard.
         smoothing_noise: asked at each update for the standard deviation of the noise on the target actor's
             actions, clipped at 2.5 of it; None is TD3 as published, 0.2 throughout. Smoothing far wider than
             the exploration asks the critic about actions that nobody took: as the exploration fell to 0.1
@@ -50,6 +55,7 @@ class FastTD3(TD3):
     saturation_weight: float = 0.0
     saturation_bound: float = 1.5
     prior_weight: float = 0.0
+    control_prior: Callable[[], float] | None = None
     smoothing_noise: Callable[[], float] | None = None
     return_bounds: tuple[float, float] | None = None
 
@@ -98,6 +104,8 @@ class FastTD3(TD3):
             loss = loss + self.saturation_weight * excess.square().sum(1).mean()
         if self.prior_weight > 0.0:
             loss = loss + self.prior_weight * inputs.square().sum(1).mean()
+        if self.control_prior is not None and (weight := self.control_prior()) > 0.0:
+            loss = loss + weight * inputs[:, :CONTROLS].square().sum(1).mean()
         self.actor.optimizer.zero_grad()
         loss.backward()
         self.actor.optimizer.step()
