@@ -161,7 +161,8 @@ paper gives none; the others start from what measurement found."""
 
 def make_agent_with_memory(settings: RecurrentSettings, env: Any, seed: int) -> RecurrentTD3:
     """Make an untrained agent with memory."""
-    from rl.td3_lstm import Hyperparameters, RecurrentTD3
+    from rl.recurrent_hyperparameters import Hyperparameters
+    from rl.td3_lstm import RecurrentTD3
 
     names = ("memory", "batch_size", "discount", "target_rate", "random_steps", "update_every")
     names += ("replay_size", "window", "burn_in", "saturation_weight", "prior_weight", "return_bounds")

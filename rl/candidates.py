@@ -81,8 +81,9 @@ def best_of_run(run: Path, seed: int, preset: Preset, settings: AgentSettings, c
     """
     from rl.actor_export import policy_of
     from rl.artefacts import load_artefact
+    from rl.run_folder import read_rows
     from rl.scoring import score_policy
-    from rl.training import TUNING_SEED, read_rows
+    from rl.training_recorder import TUNING_SEED
 
     rows = [row for row in read_rows(run / "validation.csv") if int(row["updates"]) > 0]
     if not rows:

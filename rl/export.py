@@ -87,7 +87,8 @@ def run_export(options: ExportWeights) -> None:
     from hda.presets import find_preset
     from rl.actor_export import actor_card
     from rl.artefacts import library_versions, save_artefact
-    from rl.training import TUNING_SEED, read_rows, read_run
+    from rl.run_folder import read_rows, read_run
+    from rl.training_recorder import TUNING_SEED
 
     console = Console()
     cards = [read_run(run) for run in options.runs]

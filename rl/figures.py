@@ -119,7 +119,7 @@ def draw_training(options: TrainingFigure) -> Figure:
     Raises:
         ValueError: the folder holds no log.
     """
-    from rl.training import read_rows
+    from rl.run_folder import read_rows
 
     rows = read_rows(options.run / "training.csv")
     if not rows:

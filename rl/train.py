@@ -91,7 +91,8 @@ def run_agent_training(options: TrainAgent, name: str) -> None:
     from guidance.validation import finite_number
     from hda.dtm_library import Ground, prepare_tiles
     from hda.presets import find_preset
-    from rl.training import TrainingPlan, run_training
+    from rl.run_folder import TrainingPlan
+    from rl.training import run_training
 
     for field in ("steps", "validate_every", "validation_episodes", "checkpoint_every"):
         finite_number(field, getattr(options, field), at_least=1)

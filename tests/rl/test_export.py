@@ -17,7 +17,8 @@ from rl.candidates import Choice, average_tensors
 from rl.export import ExportWeights, run_export
 from rl.figures import GainsFigure, TrainingFigure, draw_gains, draw_training, moving_average
 from rl.policy import AgentPolicy
-from rl.training import TrainingPlan, run_training
+from rl.run_folder import TrainingPlan
+from rl.training import run_training
 
 SMALL = replace(RECIPES["sac"], hidden=(8, 8), batch_size=8, random_steps=20, replay_size=100)
 

@@ -74,6 +74,7 @@ def test_decays_are_linear_between_their_ends():
 def test_noise_and_learning_rate_follow_the_step():
     env = LunarHDAEnv()
     model = make_algorithm(RECIPES["td3"], env, seed=0)
+    assert isinstance(model, FastTD3)
     for step, deviation in ((0, 0.5), (10**6, 0.1)):
         model.num_timesteps = step
         assert model.action_noise is not None

@@ -17,10 +17,14 @@ from rl.actor_export import actor_card, actor_tensors, policy_of
 from rl.algorithms import RECURRENT_RECIPES, make_agent_with_memory
 from rl.artefacts import Artefact, ArtefactError, load_artefact, save_artefact
 from rl.env import LunarHDAEnv
+from rl.recurrent_agent import AgentMemory
+from rl.recurrent_hyperparameters import Hyperparameters
+from rl.recurrent_losses import SequenceTensors, actor_loss, critic_loss
 from rl.recurrent_policy import RecurrentAgentPolicy, load_memory_actor
 from rl.replay import Episode
-from rl.td3_lstm import AgentMemory, Hyperparameters, RecurrentTD3, SequenceTensors
-from rl.training import TrainingPlan, read_rows, run_training
+from rl.run_folder import TrainingPlan, read_rows
+from rl.td3_lstm import RecurrentTD3
+from rl.training import run_training
 
 VARIANTS = tuple(RECURRENT_RECIPES)
 SMALL = {
@@ -118,9 +122,9 @@ def gradients(agent: RecurrentTD3, batch: SequenceTensors, noise: torch.Tensor) 
     agent.critic.zero_grad()
     agent.actor.zero_grad()
     weight = batch.counted.sum()
-    (agent.critic_loss(batch, noise) * weight).backward()
+    (critic_loss(agent.networks, batch, noise, agent.settings) * weight).backward()
     critic = [p.grad.clone() for p in agent.critic.parameters() if p.grad is not None]
-    (agent.actor_loss(batch) * weight).backward()
+    (actor_loss(agent.networks, batch, agent.settings) * weight).backward()
     return critic + [p.grad.clone() for p in agent.actor.parameters() if p.grad is not None]
 
 
@@ -168,7 +172,9 @@ def test_gradients_reach_the_first_step_through_the_memory():
     batch = together(agent, [random_episode(agent, 6, rng)], rng)
     batch.history.requires_grad_(True)
     batch.counted[:-1] = 0.0  # only the last transition counts
-    (gradient,) = torch.autograd.grad(agent.critic_loss(batch, torch.zeros(6, 1, 5)), batch.history)
+    (gradient,) = torch.autograd.grad(
+        critic_loss(agent.networks, batch, torch.zeros(6, 1, 5), agent.settings), batch.history
+    )
     assert (gradient[:-1].abs().sum(-1) > 0).all()
     assert (gradient[-1] == 0).all()  # the next observation enters the target alone
 
@@ -183,14 +189,18 @@ def test_targets_stop_at_the_end_and_discount_before():
             agent.critic.remember(batch.history[:1]), batch.observations[:1], batch.actions
         )
         ended = sum((value - batch.rewards).square().item() for value in values)
-        assert agent.critic_loss(batch, noise).item() == pytest.approx(ended, rel=1e-5)
+        assert critic_loss(agent.networks, batch, noise, agent.settings).item() == pytest.approx(
+            ended, rel=1e-5
+        )
         batch.terminated[:] = 0.0
         action = torch.tanh(agent.actor(batch.observations, batch.history)[0][1:])
         pasts = [past[1:] for past in agent.critic.remember(batch.history)]
         following = torch.minimum(*agent.critic.values(pasts, batch.observations[1:], action))
         target = batch.rewards + 0.98 * following
         cut = sum((value - target).square().item() for value in values)
-        assert agent.critic_loss(batch, noise).item() == pytest.approx(cut, rel=1e-5)
+        assert critic_loss(agent.networks, batch, noise, agent.settings).item() == pytest.approx(
+            cut, rel=1e-5
+        )
 
 
 # Memory in and out

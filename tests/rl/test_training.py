@@ -10,7 +10,8 @@ import pytest
 from hda.presets import PRESETS
 from rl.algorithms import RECIPES
 from rl.artefacts import ArtefactError, load_artefact
-from rl.training import TrainingPlan, read_rows, run_training
+from rl.run_folder import TrainingPlan, read_rows
+from rl.training import run_training
 
 PAPER = PRESETS["paper"]
 SMALL = {

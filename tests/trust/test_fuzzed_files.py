@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from hda.surroundings import safe_share_table
 from rl.artefacts import ArtefactError, card_digest, load_artefact, save_artefact
 from rl.policy import load_actor
-from rl.training import read_rows, read_run
+from rl.run_folder import read_rows, read_run
 from studies.monte_carlo import Chunk, Study, chunk_bounds
 from studies.rows import EpisodeRow
 from studies.shards import ShardError, read_shard, shard_path
