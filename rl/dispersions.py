@@ -24,6 +24,9 @@ class Dispersions:
         target_area: spread of the first target over the tile; 0 may find no target that is hazardous enough.
         map_noise: noise of the observed safety map.
         thrust_error: relative error of the applied thrust.
+        map_dropout: probability of a look without a map (none in the paper's setting); at most 1 results.
+        navigation_position: error of the estimated position (none in the paper's setting).
+        navigation_velocity: error of the estimated velocity (none in the paper's setting).
 
     Raises:
         ValueError: a factor is negative or not finite.
@@ -38,6 +41,9 @@ class Dispersions:
     target_area: float = 1.0
     map_noise: float = 1.0
     thrust_error: float = 1.0
+    map_dropout: float = 1.0
+    navigation_position: float = 1.0
+    navigation_velocity: float = 1.0
 
     def __post_init__(self) -> None:
         """Check every factor."""
@@ -51,11 +57,18 @@ class Dispersions:
         start = preset.start
         ranges = {name: _scaled(getattr(start, name), getattr(self, name)) for name in _START_RANGES}
         spread = start.approach_spread * self.approach_spread
+        lidar, rules = preset.lidar, preset.rules
+        dropout = min(1.0, lidar.dropout * self.map_dropout)
         return replace(
             preset,
             start=replace(start, **ranges, approach_spread=spread),
-            lidar=replace(preset.lidar, noise=preset.lidar.noise * self.map_noise),
-            rules=replace(preset.rules, thrust_error=preset.rules.thrust_error * self.thrust_error),
+            lidar=replace(lidar, noise=lidar.noise * self.map_noise, dropout=dropout),
+            rules=replace(
+                rules,
+                thrust_error=rules.thrust_error * self.thrust_error,
+                navigation_position_error=rules.navigation_position_error * self.navigation_position,
+                navigation_velocity_error=rules.navigation_velocity_error * self.navigation_velocity,
+            ),
         )
 
 

@@ -242,6 +242,37 @@ def test_each_dispersion_has_a_switch(name, off):
     assert not np.allclose(starts(name), off, atol=1e-3)
 
 
+@pytest.mark.parametrize(
+    ("name", "error"), [("navigation_position", slice(0, 3)), ("navigation_velocity", slice(3, 6))]
+)
+def test_errors_of_the_estimated_state_have_switches(name, error):
+    env = LunarHDAMapEnv("partial")
+    drawn = []
+    for factor in (1.0, 2.0, 0.0):
+        env.reset(seed=0, options={name: factor})
+        assert env.scenario is not None
+        drawn.append(env.scenario.navigation_error)
+    other = np.delete(np.arange(6), error)
+    assert np.all(drawn[0] != 0.0)
+    np.testing.assert_allclose(drawn[1][error], 2.0 * drawn[0][error], rtol=1e-12)
+    np.testing.assert_array_equal(drawn[2][error], 0.0)
+    for errors in drawn:
+        np.testing.assert_array_equal(errors[other], drawn[0][other])
+
+
+def test_dropped_maps_have_a_switch():
+    env = LunarHDAMapEnv("partial")
+
+    def maps(factor: float) -> list[bool]:
+        first = (env.reset(seed=0 if k == 0 else None, options={"map_dropout": factor})[0] for k in range(12))
+        return [bool(look["map"].any()) for look in first]
+
+    assert 0 < sum(maps(1.0)) < 12  # all alike in 12 looks: once in 460 seeds at most
+    assert all(maps(0.0))
+    assert not any(maps(2.5))
+    assert Dispersions(map_dropout=100.0).applied(PRESETS["partial"]).lidar.dropout == 1.0
+
+
 def test_without_dispersions_the_flight_to_the_first_target_is_repeatable_and_clean():
     calm = Dispersions(map_noise=0.0, thrust_error=0.0)
     env = LunarHDAMapEnv(dispersions=calm)
