@@ -12,7 +12,7 @@ PIP_INSTALL := $(BIN)/python -m pip --disable-pip-version-check install
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help setup lint test test-all compare bench clean
+.PHONY: help setup lint test test-all compare bench docs clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-9s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -37,8 +37,12 @@ compare: $(VENV)/.installed  ## fly every policy on the same episodes and print 
 bench: $(VENV)/.installed  ## measure the speed of the inner loops
 	$(BIN)/python -m studies.bench $(ARGS)
 
+docs: $(VENV)/.installed-docs  ## build the documentation into site/; a warning is an error
+	$(BIN)/zensical build --strict --clean
+	@echo "open site/index.html"
+
 clean:  ## remove .venv, caches and build products; results and the per-user terrain cache stay
-	rm -rf $(VENV) build dist .pytest_cache .ruff_cache .hypothesis .import_linter_cache
+	rm -rf $(VENV) build dist site .cache .pytest_cache .ruff_cache .hypothesis .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(BIN)/python:
@@ -56,4 +60,8 @@ $(VENV)/.installed: pyproject.toml | $(BIN)/python
 
 $(VENV)/.installed-dev: pyproject.toml | $(BIN)/python
 	$(PIP_INSTALL) -e '.[dev]'
+	@touch $(VENV)/.installed $(VENV)/.installed-docs $@
+
+$(VENV)/.installed-docs: pyproject.toml | $(BIN)/python
+	$(PIP_INSTALL) -e '.[docs]'
 	@touch $(VENV)/.installed $@

@@ -51,6 +51,7 @@ PRESETS: dict[str, Preset] = {
         ),
     )
 }
+"""The presets by name."""
 
 
 def find_preset(preset: str | Preset) -> Preset:
