@@ -1,6 +1,9 @@
 """Updates a second of plain Stable-Baselines3 TD3 and of ours: same sizes, one thread, taken in turn.
 
+The agents with memory are measured apart: they learn from sequences, and there is no other to compare with.
+
 python -m rl.training_speed
+python -m rl.training_speed --profile    # and what the update of td3-lstm spends its time on
 """
 
 from __future__ import annotations
@@ -23,12 +26,33 @@ class TrainingSpeed:
         updates: in one measurement.
         batch_size: transitions per update.
         hidden: sizes of the hidden layers.
+        sequences: per update of an agent with memory.
+        length: transitions in each.
+        memory: hidden size of its LSTMs.
+        profile: print what the update of td3-lstm spends its time on.
     """
 
     rounds: int = 7
     updates: int = 60
     batch_size: int = 256
     hidden: tuple[int, ...] = (256, 256)
+    sequences: int = 100
+    length: int = 10
+    memory: int = 128
+    profile: bool = False
+
+
+@dataclass(frozen=True)
+class UpdateRate:
+    """Updates a second, medians over the rounds.
+
+    Attributes:
+        processor: by processor time, which other programs disturb least.
+        wall: by the clock on the wall.
+    """
+
+    processor: float
+    wall: float
 
 
 def _filled(kind: Any, options: TrainingSpeed, fused: bool) -> Any:
@@ -80,12 +104,72 @@ def measure_training_speed(options: TrainingSpeed) -> dict[str, float]:
     return {name: 1.0 / float(np.median(values)) for name, values in times.items()}
 
 
+def _filled_with_sequences(name: str, options: TrainingSpeed) -> Any:
+    """An agent with memory whose replay memory holds random episodes of one length."""
+    from dataclasses import replace
+
+    from rl.algorithms import RECURRENT_RECIPES, make_agent_with_memory
+    from rl.env import LunarHDAEnv
+    from rl.replay import Episode
+
+    recipe = replace(RECURRENT_RECIPES[name], batch_size=options.sequences, memory=options.memory)
+    agent = make_agent_with_memory(recipe, LunarHDAEnv(), 0)
+    rng, length = np.random.default_rng(0), options.length
+    for _ in range(2 * options.sequences):
+        observations = rng.uniform(-1.0, 1.0, (length + 1, agent.sizes.observation))
+        actions = rng.uniform(-1.0, 1.0, (length, agent.sizes.action))
+        parts = (part.astype(np.float32) for part in (observations, actions, rng.uniform(-1.0, 1.0, length)))
+        agent.replay_buffer.store(Episode(*parts, terminated=True))
+    return agent
+
+
+def measure_memory_speed(options: TrainingSpeed) -> dict[str, UpdateRate]:
+    """Updates a second of td3-lstm and td3-lstm-plus, in float32 and with bfloat16 products."""
+    import torch
+
+    torch.set_num_threads(1)
+    agents = {name: _filled_with_sequences(name, options) for name in ("td3-lstm", "td3-lstm-plus")}
+    precisions = {"float32": "highest", "bfloat16": "medium"}
+    times: dict[str, list[tuple[float, float]]] = {}
+    before = torch.get_float32_matmul_precision()
+    for _ in range(options.rounds):
+        for name, agent in agents.items():
+            for kind, precision in precisions.items():
+                torch.set_float32_matmul_precision(precision)
+                agent.train(2)
+                started = clock.process_time(), clock.perf_counter()
+                agent.train(options.updates)
+                spent = clock.process_time() - started[0], clock.perf_counter() - started[1]
+                times.setdefault(f"{name} {kind}", []).append(spent)
+    torch.set_float32_matmul_precision(before)
+    medians = {name: np.median(values, axis=0) / options.updates for name, values in times.items()}
+    return {name: UpdateRate(*(1.0 / float(value) for value in spent)) for name, spent in medians.items()}
+
+
+def profile_memory(options: TrainingSpeed) -> str:
+    """Table of what the update of td3-lstm spends its time on, operator by operator."""
+    import torch
+    from torch.profiler import ProfilerActivity, profile
+
+    torch.set_num_threads(1)
+    agent = _filled_with_sequences("td3-lstm", options)
+    agent.train(4)
+    with profile(activities=[ProfilerActivity.CPU]) as taken:
+        agent.train(options.updates)
+    return taken.key_averages().table(sort_by="self_cpu_time_total", row_limit=12, max_name_column_width=40)
+
+
 def main() -> None:
     """Command line."""
-    speeds = measure_training_speed(tyro.cli(TrainingSpeed, description=__doc__))
+    options = tyro.cli(TrainingSpeed, description=__doc__)
+    speeds = measure_training_speed(options)
     reference = speeds["stable-baselines3"]
     for name, speed in speeds.items():
-        sys.stdout.write(f"{name:20s} {speed:6.1f} updates/s  {speed / reference:5.2f}\n")
+        sys.stdout.write(f"{name:23s} {speed:6.1f} updates/s  {speed / reference:5.2f}\n")
+    for name, rate in measure_memory_speed(options).items():
+        sys.stdout.write(f"{name:23s} {rate.processor:6.1f} updates/s, {rate.wall:6.1f} by the wall clock\n")
+    if options.profile:
+        sys.stdout.write(profile_memory(options))
 
 
 if __name__ == "__main__":
