@@ -5,6 +5,7 @@ from __future__ import annotations
 from guidance.soft_landing import SoftLandingOptions
 from hda.policies.adjusted_descent import AdjustedDescent
 from hda.policies.composition import ComposedPolicy, PrivilegedComposition
+from hda.policies.deferred_decision import DeferredDecisionPolicy
 from hda.policies.hazard_aware import HazardAwareSite
 from hda.policies.hindsight import BestKnownSite
 from hda.policies.oracle_fuel import CheapestSafeSite
@@ -68,6 +69,11 @@ ENTRIES: tuple[PolicyEntry, ...] = (
         "hazard-aware+zem-zev",
         lambda: ComposedPolicy("hazard-aware+zem-zev", HazardAwareSite(), FixedGainZemZev()),
         "the sites of hazard-aware's objective, flown by ZEM/ZEV",
+    ),
+    PolicyEntry(
+        "deferred-decision",
+        DeferredDecisionPolicy,
+        "one trunk to several candidate sites, kept as long as a budget of propellant allows, then a branch",
     ),
     PolicyEntry(
         "oracle-fuel",
