@@ -97,11 +97,17 @@ def best_of_run(run: Path, seed: int, preset: Preset, settings: AgentSettings, c
         score = score_policy(policy_of(tensors, settings), preset, "tuning", study_seed, episodes)
         return Candidate(run, seed, tuple(steps[window]), tensors, score)
 
+    def rank(window: slice) -> tuple[float, float]:
+        if window.stop - window.start > 1:
+            return fly(window, TUNING_SEED, first).score.rank
+        row = rows[window.start]  # flown while it learnt
+        return float(row["success_percent"]), float(row["reward"])
+
     windows = [
         slice(end - length, end)
         for length in sorted(set(choice.averages))
         for end in range(length, len(actors) + 1)
     ]
-    ranked = sorted(windows, key=lambda window: fly(window, TUNING_SEED, first).score.rank, reverse=True)
+    ranked = sorted(windows, key=rank, reverse=True)
     again = [fly(window, CHOICE_SEED, choice.episodes) for window in ranked[: choice.candidates]]
     return max(again, key=lambda candidate: candidate.score.rank)
