@@ -71,7 +71,10 @@ def find_primer_flight(problem: LandingProblem) -> PrimerFlight | None:
     case[:3], case[3:6], case[6:9] = problem.offset, problem.state.velocity, problem.gravity
     case[:9] /= push
     case[9] = lander.max_mass_flow / mass
-    if not solve_primer(case, x):
+    try:
+        if not solve_primer(case, x):
+            return None
+    except ZeroDivisionError:  # no length or no pull to scale by
         return None
     times = float(x[6]), float(x[7])
     flight = PrimerFlight(max(times[0], 0.0), times[1], float(x[8]), case[9], x[:6].reshape(2, 3), times)

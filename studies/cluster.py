@@ -17,6 +17,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sized
 from concurrent.futures import CancelledError, Executor, Future
 from contextlib import contextmanager
+from functools import cache
 from typing import TYPE_CHECKING, Any, cast
 
 from studies.executor import WorkerDiedError
@@ -115,12 +116,18 @@ def run_alike(
     Raises:
         ClusterError: the software differs; the message names the first difference.
     """
-    here = identify_software(paths)
+    here = _software_here(paths)
     for key in software:
         if here[key] != software[key]:
             raise ClusterError(f"a worker runs other software: {_first_difference(key, software, here)}")
     with _ONE_AT_A_TIME:  # threads of one worker would gain nothing, and share caches
         return function(*arguments)
+
+
+@cache
+def _software_here(paths: tuple[str, ...]) -> dict[str, Any]:
+    """Software of this worker, looked at once: what it has imported does not change any more."""
+    return identify_software(paths)
 
 
 def _first_difference(key: str, ours: Mapping[str, Any], theirs: Mapping[str, Any]) -> str:

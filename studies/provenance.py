@@ -10,7 +10,6 @@ import subprocess
 import sys
 from dataclasses import asdict
 from datetime import UTC, datetime
-from functools import cache
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -70,9 +69,8 @@ def identify_study(study: Study) -> dict[str, Any]:
     }
 
 
-@cache
 def identify_software(paths: tuple[str, ...] = ()) -> dict[str, Any]:
-    """What must be the same in every process that flies episodes of a study; looked at once in a process.
+    """What must be the same in every process that flies episodes of a study.
 
     Args:
         paths: paths `package.module:Name` of policies that are not registered.

@@ -184,8 +184,14 @@ def test_the_first_look_selects_whatever_the_nominal_target_looks_like(centre, m
 def test_where_nothing_looks_safe_the_safest_is_taken():
     look = observation(map_of(0.1, 0.94))
     np.testing.assert_array_equal(NearestSafeSite().select(look, True)[0], safest_site(look))
+
+
+def test_a_look_without_a_map_moves_no_target():
     dark = observation(np.zeros((9, 9)))
-    np.testing.assert_array_equal(NearestSafeSite().select(dark, True)[0], dark.site(0, 0))
+    for memory in (False, True):
+        site, after = NearestSafeSite().select(dark, memory)
+        np.testing.assert_array_equal(site, dark.target)
+        assert after is memory
 
 
 def test_the_thresholds_are_parameters():
