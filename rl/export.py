@@ -117,6 +117,7 @@ def run_export(options: ExportWeights) -> None:
         "ground": Ground(preset.terrain, preset.criteria).key,
         "splits": {"learning": "train", "choice": "tuning", "report": "validation"},
         "tuning_seeds": [TUNING_SEED, CHOICE_SEED],
+        "choice": asdict(options.choice),
         "seed": chosen.seed,
         "steps": list(chosen.steps),
         "seeds": seeds,
