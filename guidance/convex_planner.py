@@ -46,10 +46,16 @@ def plan_convex(
         solution, solves = outcome.solution, outcome.solves
         if solution is None and outcome.cause:
             return Plan(PlanStatus.INFEASIBLE, problem, METHOD, message=outcome.cause)
-    return _finish(task, solution, solves, PlanStatus.OPTIMAL)
+    return _finish(task, solution, solves, PlanStatus.OPTIMAL, time_of_flight)
 
 
-def _finish(task: ConvexTask, found: ConvexSolution | None, solves: int, status: PlanStatus) -> Plan:
+def _finish(
+    task: ConvexTask,
+    found: ConvexSolution | None,
+    solves: int,
+    status: PlanStatus,
+    time_of_flight: float | None,
+) -> Plan:
     """Refine a solution until the true thrust bounds hold, check the tank, and make it a Plan."""
     problem = task.problem
     message = "no feasible time of flight found"
@@ -67,11 +73,25 @@ def _finish(task: ConvexTask, found: ConvexSolution | None, solves: int, status:
         words = "feasible only with thrust bounds relaxed outward: on the edge of what the lander can do"
         return replace(none, status=PlanStatus.LIMIT_REACHED, message=words)
     if not relaxation_tight(problem, solution):
-        words = (
-            "the relaxed optimum breaks min_thrust or the pointing limit; method='casadi' may find a flight"
-        )
-        return replace(none, status=PlanStatus.LIMIT_REACHED, message=words)
+        words = "the relaxed optimum breaks min_thrust or the pointing limit"
+        none = replace(none, status=PlanStatus.LIMIT_REACHED, message=words)
+        return none if status is PlanStatus.NEAREST else _unrelaxed(none, solution, time_of_flight)
     return Plan.of_flight(status, problem, METHOD, solution.trajectory(problem), solves)
+
+
+def _unrelaxed(lost: Plan, relaxed: ConvexSolution, time_of_flight: float | None) -> Plan:
+    """Ask the unrelaxed problem where relaxing lost something: from the relaxed flight, then from scratch."""
+    from guidance.reference_casadi import plan_casadi
+
+    problem, plan = lost.problem, lost
+    flight = Plan.of_flight(PlanStatus.OPTIMAL, problem, METHOD, relaxed.trajectory(problem))
+    for guess in (flight, None):
+        found = plan_casadi(problem, flight.nodes, time_of_flight, guess)
+        solves, message = plan.solves + found.solves, f"{found.message}; {lost.message}"
+        if found.status.has_flight:
+            return replace(found, solves=solves, message=message)
+        plan = replace(lost, solves=solves, message=message)
+    return plan
 
 
 def _shortage(problem: LandingProblem, solution: ConvexSolution) -> str:
@@ -133,4 +153,4 @@ def plan_nearest(problem: LandingProblem, nodes: int, time_of_flight: float | No
         last, more = outcome.solution, outcome.solves
         if last is not None and last.propellant_share > problem.log_mass_ratio + _OVERDRAFT:
             last, more = economical.solve(least.time), more + 1
-    return _finish(economical, last, solves + more, PlanStatus.NEAREST)
+    return _finish(economical, last, solves + more, PlanStatus.NEAREST, time_of_flight)

@@ -55,7 +55,9 @@ def solve_pdg(
         time_of_flight: [s] None searches for the best.
         nodes: N; the plan has N - 1 intervals of equal duration.
         method: 'convex' (lossless convexification in Clarabel; fast), 'cvxpy' (the same problem, written for
-            reading) or 'casadi' (the unrelaxed nonconvex problem by fatrop or IPOPT).
+            reading) or 'casadi' (the unrelaxed nonconvex problem by fatrop or IPOPT). Where the relaxation
+            breaks min_thrust or the pointing limit, 'convex' asks 'casadi' too: `plan.method` tells whose
+            flight it is, `plan.message` why.
         unreachable: what to do where the target is out of reach: 'raise', or plan to the softly reachable
             point 'nearest' to it in its plane (always by the convex method).
         guess: an earlier Plan of nearly the same flight: what is left of it seeds the search where the

@@ -65,6 +65,25 @@ def harsh_start(rng):
     ]
 
 
+def start_with_strong_engine(rng):
+    """State, target and options of a descent whose engine, once lit, always pushes more than the weight."""
+    gravity, dry_mass = rng.choice([1.62, 3.71]), rng.choice([300.0, 1150.0, 1505.0])
+    mass = dry_mass * (1.0 + rng.uniform(0.05, 0.3))
+    strongest = rng.uniform(2.5, 6.0)
+    lander = Lander(
+        float(dry_mass),
+        mass * gravity * strongest,
+        rng.uniform(220.0, 360.0),
+        min_thrust=mass * gravity * max(1.2, 0.5 * strongest),
+        pointing_limit=None if rng.random() < 0.5 else rng.uniform(0.8, 2.2),
+    )
+    time = rng.uniform(8.0, 30.0)
+    height = rng.uniform(0.3, 1.2) * 0.5 * gravity * time**2
+    start = [*rng.normal(0.0, 0.3, 2) * height, 50.0 + height, *rng.normal(0.0, 0.15, 2) * gravity * time]
+    start += [-rng.uniform(0.0, 0.5) * gravity * time, mass]
+    return {"state": start, "target": TARGET, "lander": lander, "gravity": (0.0, 0.0, -gravity)}
+
+
 def feasible_start(rng):
     """A start that can land: random burns of at most 95 % thrust flown backward in time from touchdown."""
     while True:
