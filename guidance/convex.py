@@ -112,7 +112,7 @@ class ConvexTemplate:
         self.layout = self._condensed or self._whole
         self._families = constraint_set.condensed_families if condensed else constraint_set.families
         self._constant: dict[Family, Rows] = {}
-        nominal = _nominal_numbers(constraint_set.nodes)
+        nominal = nominal_numbers(constraint_set.nodes)
         rows = self.rows(nominal)
         for family in _CONSTANT_FAMILIES.intersection(self._families):
             self._constant[family] = family(self.layout, nominal)
@@ -127,7 +127,7 @@ class ConvexTemplate:
         values, bound = self._numbers(rows)
         shape = (int(first[-1]), self.layout.size)
         matrix = csc_matrix((values[self._order], self._row[self._order], pointer), shape=shape)
-        self._assembled = matrix, bound, self.cost(False), _cones(rows), tolerance
+        self._assembled = matrix, bound, self.cost(False), cones_of(rows), tolerance
         self._solver = ConicSolver(*self._assembled)
         self._careful: ConicSolver | None = None
 
@@ -182,7 +182,8 @@ class ConvexTemplate:
         return total
 
 
-def _cones(rows: list[Rows]) -> tuple[tuple[str, int], ...]:
+def cones_of(rows: list[Rows]) -> tuple[tuple[str, int], ...]:
+    """(name, size) of each cone that the rows stand in, in their order."""
     cones: list[tuple[str, int]] = []
     for part in rows:
         if part.cone == "second_order":
@@ -192,7 +193,7 @@ def _cones(rows: list[Rows]) -> tuple[tuple[str, int], ...]:
     return tuple(cones)
 
 
-def _nominal_numbers(nodes: int) -> ScaledProblem:
+def nominal_numbers(nodes: int) -> ScaledProblem:
     """Numbers of the size that a descent has; only the solver's internal scaling depends on them."""
     from guidance.constants import MOON_GRAVITY
     from guidance.lander import Lander
