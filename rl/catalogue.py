@@ -18,6 +18,9 @@ _AGENTS = {
 }
 
 
+_LATE_MOVE = 2.5  # [m] which no plan is made anew for in the last seconds; chosen on the tuning tiles
+
+
 def _agent(name: str) -> PolicyEntry:
     return PolicyEntry(name, lambda: AgentPolicy(name, shipped(name)), _AGENTS[name])
 
@@ -40,7 +43,9 @@ _ENTRIES = (
         "td3",
         PolicyEntry(
             "td3+convex",
-            lambda: ComposedPolicy("td3+convex", AgentSite(shipped("td3")), PlannedDescent()),
+            lambda: ComposedPolicy(
+                "td3+convex", AgentSite(shipped("td3")), PlannedDescent(site_tolerance=_LATE_MOVE)
+            ),
             "the sites of td3, flown by convex guidance",
         ),
     ),
