@@ -98,11 +98,11 @@ def test_the_same_site_is_tracked_to_the_end_without_a_new_plan() -> None:
 def test_a_late_move_within_the_tolerance_makes_no_new_plan(moved: float, kept: bool) -> None:
     scenario = scenario_of(0)
     law = PlannedDescent(site_tolerance=2.5, commit_time=60.0)
-    look = low_observation(scenario, 900.0, 30.0)
+    look = observe(scenario, begin_flight(scenario))
     _, _, memory = law.command(look, scenario.nominal_target, law.begin(scenario.view))
     assert memory.reference is not None
     left = memory.reference
-    later = replace(look, state=State(left.position[0], left.velocity[0], 1168.0))
+    later = replace(look, state=State(left.position[0], left.velocity[0], 1199.0))
     command, status, after = law.command(later, scenario.nominal_target + np.array([0.0, moved, 0.0]), memory)
     assert status is DecisionStatus.NOMINAL
     assert isinstance(command, PlanCommand)
