@@ -1,12 +1,15 @@
-"""The edge of every study's command: a wrong option is one line, not a traceback."""
+"""The edge of every study's command: errors in one line, policies by name, a folder that can be written."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 
 from rich.console import Console
+
+from hda.registry import policy_entry, policy_names
 
 
 @contextmanager
@@ -17,3 +20,46 @@ def one_line_errors() -> Iterator[None]:
     except (ValueError, OSError) as error:
         Console(stderr=True).print(f"error: {error}", style="red", markup=False, highlight=False)
         sys.exit(2)
+
+
+@contextmanager
+def resumable() -> Iterator[None]:
+    """As `one_line_errors`; a study that the user stops says how it goes on, and exits with code 130."""
+    try:
+        with one_line_errors():
+            yield
+    except KeyboardInterrupt:
+        Console(stderr=True).print("stopped; finished episodes are kept, --resume goes on", style="yellow")
+        sys.exit(130)
+
+
+def choose_policies(wanted: Sequence[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Names in the order of the registry, each once, and the paths among what was asked for.
+
+    `default` and `all` stand for several names; a path `package.module:Name` is loaded and gives a name.
+
+    Raises:
+        ValueError: a name is unknown, a path leads to no policy, or none was given.
+    """
+    if not wanted:
+        raise ValueError("policies must name at least one policy")
+    groups = {
+        "all": policy_names(),
+        "default": tuple(name for name in policy_names() if not policy_entry(name).slow),
+    }
+    chosen = {name for entry in wanted for name in groups.get(entry) or (policy_entry(entry).name,)}
+    paths = tuple(dict.fromkeys(entry for entry in wanted if ":" in entry))
+    return tuple(name for name in policy_names() if name in chosen), paths
+
+
+def open_folder(out: Path) -> Path:
+    """Make the results folder and write a file in it, before any episode is flown.
+
+    Raises:
+        OSError: the folder cannot be made or written.
+    """
+    out.mkdir(parents=True, exist_ok=True)
+    probe = out / ".writable"
+    probe.write_text("")
+    probe.unlink()
+    return out

@@ -7,8 +7,6 @@ test of safe landings against single-divert. Privileged policies see the true ma
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -21,17 +19,12 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from guidance.validation import finite_number
 from hda.own_terrain import OWN_SPLIT
 from hda.presets import find_preset, place_preset
-from hda.registry import policy_entry, policy_names
+from hda.registry import policy_entry
 from hda.scenario import Preset
-from studies.command_line import one_line_errors
+from studies.command_line import choose_policies, open_folder, resumable
 from studies.contract import check_contract
 from studies.executor import OpenExecutor, local_processes
-from studies.monte_carlo import (
-    Study,
-    chunk_bounds,
-    fly_chunks,
-    prepare_study,
-)
+from studies.monte_carlo import Study, chunk_bounds, fly_chunks, prepare_study
 from studies.paired import compare_pairs, write_paired
 from studies.provenance import describe_study, write_provenance
 from studies.report import ReportContent, fly_report_flights, write_report
@@ -125,25 +118,6 @@ def choose_ground(options: Comparison) -> tuple[Preset, str]:
     return preset, OWN_SPLIT
 
 
-def choose_policies(wanted: Sequence[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Names in the order of the registry, each once, and the paths among what was asked for.
-
-    `default` and `all` stand for several names; a path `package.module:Name` is loaded and gives a name.
-
-    Raises:
-        ValueError: a name is unknown, a path leads to no policy, or none was given.
-    """
-    if not wanted:
-        raise ValueError("policies must name at least one policy")
-    groups = {
-        "all": policy_names(),
-        "default": tuple(name for name in policy_names() if not policy_entry(name).slow),
-    }
-    chosen = {name for entry in wanted for name in groups.get(entry) or (policy_entry(entry).name,)}
-    paths = tuple(dict.fromkeys(entry for entry in wanted if ":" in entry))
-    return tuple(name for name in policy_names() if name in chosen), paths
-
-
 def choose_existing(options: Comparison) -> Existing:
     """What to do with a folder that holds a study.
 
@@ -173,19 +147,6 @@ def choose_executor(options: Comparison) -> tuple[OpenExecutor, bool]:
     if options.scheduler is not None:
         return partial(dask_scheduler, options.scheduler, paths), False
     return partial(slurm_jobs, options.slurm_jobs, paths), False
-
-
-def open_folder(out: Path) -> Path:
-    """Make the results folder and write a file in it, before any episode is flown.
-
-    Raises:
-        OSError: the folder cannot be made or written.
-    """
-    out.mkdir(parents=True, exist_ok=True)
-    probe = out / ".writable"
-    probe.write_text("")
-    probe.unlink()
-    return out
 
 
 def with_reference(study: Study) -> Study:
@@ -295,12 +256,8 @@ def report_study(out: Path, content: ReportContent, workers: int) -> None:
 def main() -> None:
     """Command line; a wrong option is one line on stderr and exit code 2."""
     options = tyro.cli(Comparison, description=__doc__)
-    try:
-        with one_line_errors():
-            compare(options)
-    except KeyboardInterrupt:
-        Console(stderr=True).print("stopped; finished episodes are kept, --resume goes on", style="yellow")
-        sys.exit(130)
+    with resumable():
+        compare(options)
 
 
 if __name__ == "__main__":

@@ -22,8 +22,7 @@ from guidance.validation import finite_number
 from hda.episode import fly
 from hda.presets import PRESETS, sample_scenario, unknown_name
 from hda.scenario import Preset
-from studies.command_line import one_line_errors
-from studies.compare import open_folder
+from studies.command_line import one_line_errors, open_folder
 from studies.failure_causes import Cause, Failure, explain_failure, find_remedies
 from studies.flights import ENDINGS
 from studies.monte_carlo import Study

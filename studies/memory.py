@@ -28,8 +28,7 @@ from guidance.validation import finite_number
 from hda.presets import find_preset, unknown_name
 from rl.algorithms import RECIPES
 from rl.candidates import Choice
-from studies.command_line import one_line_errors
-from studies.compare import open_folder
+from studies.command_line import one_line_errors, open_folder
 from studies.memory_answer import GroupRow, compare_groups, conclude
 from studies.memory_report import draw_memory, markdown, write_csv
 from studies.memory_scores import collect_scores, read_progress

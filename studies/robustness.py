@@ -9,7 +9,6 @@ breaks.md tells which policy breaks first and why: the ending that became more f
 from __future__ import annotations
 
 import csv
-import sys
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -27,8 +26,7 @@ from hda.episode import fly
 from hda.presets import find_preset, sample_scenario
 from hda.registry import policy_entry
 from hda.scenario import Preset
-from studies.command_line import one_line_errors
-from studies.compare import choose_policies, open_folder
+from studies.command_line import choose_policies, open_folder, resumable
 from studies.failure_causes import explain_failure
 from studies.monte_carlo import Study
 from studies.point_score import SCORE_COLUMNS, score_rows
@@ -36,49 +34,37 @@ from studies.points import Point, Rows, fly_points
 from studies.provenance import describe_study, write_provenance
 from studies.robustness_breaks import Break, find_breaks, success_drop
 from studies.robustness_factors import FACTORS, Factor, choose_factors
+from studies.run_options import RunOptions
 from studies.statistics import wilson_interval
-from studies.study_folder import Existing
 
 _NOMINAL = "nominal"
 _EXPLAINED = 12  # failures of a break that are flown again
 
 
-@dataclass(frozen=True)
-class Robustness:
+@dataclass(frozen=True, kw_only=True)
+class Robustness(RunOptions):
     """Command line of the robustness sweep.
 
     Attributes:
         factors: names of factors; `all` is every one.
-        policies: names of policies; `default` is every one that is not slow; `package.module:Name` is your
-            own.
         episodes: episodes per policy and level.
         levels: levels per factor beside the preset's own value, at most.
         preset: the setting that is varied.
         study_seed: seed of the study; equal seeds give equal episodes at every level.
-        split: tile split: validation or fresh.
-        workers: processes; changes nothing but the time.
-        out: folder for results.
         resume: keep finished episodes of the same sweep in the folder, and fly what is missing.
         figures: draw a figure per factor.
     """
 
     factors: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME ...")] = ("all",)
-    policies: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME ...")] = ("default",)
     episodes: int = 200
     levels: int = 4
     preset: str = "paper"
-    study_seed: int = 0
-    split: str = "validation"
-    workers: int = 2
     out: Path = Path("results/robustness")
-    resume: bool = False
-    figures: bool = True
 
     def __post_init__(self) -> None:
         """Check every number."""
-        for name in ("episodes", "levels", "workers"):
-            finite_number(name, getattr(self, name), at_least=1)
-        finite_number("study_seed", self.study_seed, at_least=0)
+        super().__post_init__()
+        finite_number("levels", self.levels, at_least=1)
 
 
 @dataclass(frozen=True)
@@ -139,8 +125,7 @@ def run_robustness(options: Robustness) -> list[Sweep]:
     """
     own, points = plan_points(options)
     out = open_folder(options.out)
-    existing = Existing.RESUME if options.resume else Existing.REFUSE
-    flown = fly_points(out, points, existing, options.workers)
+    flown = fly_points(out, points, options.existing, options.workers)
     studies = {point.label: point.study for point in points}
     sweeps = []
     for factor in choose_factors(options.factors):
@@ -260,14 +245,10 @@ def print_sweeps(sweeps: Sequence[Sweep]) -> None:
 
 def main() -> None:
     """Command line; a wrong option is one line on stderr and exit code 2."""
-    try:
-        with one_line_errors():
-            options = tyro.cli(Robustness, description=__doc__)
-            print_sweeps(run_robustness(options))
-            Console().print(f"results in {options.out}")
-    except KeyboardInterrupt:
-        Console(stderr=True).print("stopped; finished episodes are kept, --resume goes on", style="yellow")
-        sys.exit(130)
+    with resumable():
+        options = tyro.cli(Robustness, description=__doc__)
+        print_sweeps(run_robustness(options))
+        Console().print(f"results in {options.out}")
 
 
 if __name__ == "__main__":

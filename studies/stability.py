@@ -22,8 +22,7 @@ from rich.table import Table
 from guidance.validation import finite_number
 from hda.presets import find_preset
 from hda.scenario import Preset
-from studies.command_line import one_line_errors
-from studies.compare import open_folder
+from studies.command_line import one_line_errors, open_folder
 from studies.stability_report import conclude
 from studies.stability_sweep import GainRow, MarginRow, Requirement, gain_box, gain_row, margin_row
 

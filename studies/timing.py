@@ -19,8 +19,7 @@ from rich.console import Console
 from rich.table import Table
 
 from guidance.validation import finite_number
-from studies.command_line import one_line_errors
-from studies.compare import open_folder
+from studies.command_line import one_line_errors, open_folder
 from studies.timing_conclusions import conclude
 from studies.timing_measures import Call, Summary, measure_calls, summarize_calls
 from studies.timing_methods import paper_cases, reference_cases, timed_methods

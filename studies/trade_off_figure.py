@@ -13,7 +13,7 @@ from studies.figures import COLORS
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from studies.trade_off import Bounds, TradeOffRow
+    from studies.trade_off_table import Bounds, TradeOffRow
 
 _MARKERS = ("o", "s", "D", "^", "v", "P", "X")
 

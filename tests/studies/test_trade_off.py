@@ -16,7 +16,8 @@ from hda.presets import sample_scenario
 from hda.registry import make_policy
 from studies.point_score import PointScore
 from studies.statistics import Interval
-from studies.trade_off import TradeOff, TradeOffRow, find_front, plan_points, run_trade_off
+from studies.trade_off import TradeOff, find_front, plan_points, run_trade_off
+from studies.trade_off_table import TradeOffRow
 from studies.weight_sweep import SWEEP, change_weight, sweep_name, sweep_path
 
 
