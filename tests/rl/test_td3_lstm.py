@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-import gymnasium
 import numpy as np
 import pytest
 import torch
 from gymnasium import spaces
 
+from examples.memory_task import Recall
 from hda.episode import fly
 from hda.presets import PRESETS, sample_scenario
 from rl.actor_export import actor_card, actor_tensors, policy_of
@@ -35,36 +35,22 @@ SMALL = {
 }
 
 
-class Recall(gymnasium.Env):
-    """A cue of -1 or 1 is shown once; three steps later the action must have its sign.
+class WideRecall(Recall):
+    """The example's task with actions from -2 to 2: the agent must scale its own.
 
-    The observation is (cue, time); after the first step the cue reads 0, so an agent without memory acts
-    alike for both cues, and its mean reward over them is exactly 0.
+    An agent without memory acts alike for both cues, so its mean reward over them is exactly 0.
     """
 
-    observation_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
     action_space = spaces.Box(-2.0, 2.0, (1,), np.float32)
-
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None):
-        super().reset(seed=seed)
-        self.time = 0
-        self.cue = options["cue"] if options else float(self.np_random.choice([-1.0, 1.0]))
-        return self._look(), {}
-
-    def _look(self) -> np.ndarray:
-        return np.array([self.cue if self.time == 0 else 0.0, self.time / 4.0], np.float32)
 
     def step(self, action):
         assert self.action_space.contains(action)
-        self.time += 1
-        ended = self.time == 4
-        reward = 0.5 * self.cue * float(action[0]) if ended else 0.0
-        return self._look(), reward, ended, False, {}
+        return super().step(0.5 * action)
 
 
 def mean_recall(agent) -> float:
     """Mean reward over both cues, by SB3's predict signature."""
-    env, total = Recall(), 0.0
+    env, total = WideRecall(), 0.0
     for cue in (-1.0, 1.0):
         observation, _ = env.reset(options={"cue": cue})
         state, ended, start = None, False, True
@@ -88,7 +74,7 @@ def test_memory_solves_a_task_that_needs_it(plus):
         target_rate=0.02,
         saturation_weight=0.1,
     )
-    agent = RecurrentTD3(Recall(), settings, 0, lambda step: 3e-3, lambda step: 0.3)
+    agent = RecurrentTD3(WideRecall(), settings, 0, lambda step: 3e-3, lambda step: 0.3)
     agent.learn(1400)
     assert mean_recall(agent) > 0.8
 
@@ -97,7 +83,7 @@ def test_an_agent_without_memory_cannot_solve_it():
     from stable_baselines3 import TD3
 
     policy: Any = {"net_arch": [32, 32]}
-    agent = TD3("MlpPolicy", Recall(), learning_starts=400, policy_kwargs=policy, seed=0, device="cpu")
+    agent = TD3("MlpPolicy", WideRecall(), learning_starts=400, policy_kwargs=policy, seed=0, device="cpu")
     agent.learn(1000)
     assert mean_recall(agent) == pytest.approx(0.0, abs=1e-6)
 
