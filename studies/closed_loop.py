@@ -30,7 +30,7 @@ from hda.scenario import Preset
 from hda.site_selection import NearestSafeSite, SingleDivertSite, SiteSelection
 from studies.command_line import one_line_errors
 from studies.executor import local_processes
-from studies.monte_carlo import CHUNK_EPISODES, Study, prepare_study
+from studies.monte_carlo import Study, chunk_bounds, prepare_study
 from studies.rows import EpisodeRow, summarize_episode
 from studies.statistics import wilson_interval
 
@@ -90,15 +90,12 @@ def fly_law(preset: Preset, sites: str, law: GuidanceLaw, first: int, last: int)
     ]
 
 
-def fly_all(preset: Preset, options: Sweep, law: GuidanceLaw, executor: Executor | None) -> list[EpisodeRow]:
+def fly_all(study: Study, sites: str, law: GuidanceLaw, executor: Executor | None) -> list[EpisodeRow]:
     """Fly every episode of one line."""
-    bounds = [
-        (first, min(first + CHUNK_EPISODES, options.episodes))
-        for first in range(0, options.episodes, CHUNK_EPISODES)
-    ]
+    bounds = chunk_bounds(study)
     if executor is None:
-        return [row for ends in bounds for row in fly_law(preset, options.sites, law, *ends)]
-    futures = [executor.submit(fly_law, preset, options.sites, law, *ends) for ends in bounds]
+        return [row for ends in bounds for row in fly_law(study.preset, sites, law, *ends)]
+    futures = [executor.submit(fly_law, study.preset, sites, law, *ends) for ends in bounds]
     return [row for future in futures for row in future.result()]
 
 
@@ -119,11 +116,12 @@ def sweep(options: Sweep) -> dict[str, list[str]]:
     finite_number("episodes", options.episodes, at_least=1)
     finite_number("workers", options.workers, at_least=1)
     preset = find_preset(options.preset)
-    prepare_study(Study(preset, (), options.episodes, split="tuning"), options.workers)
+    study = Study(preset, (), options.episodes, split="tuning")
+    prepare_study(study, options.workers)
     lines: dict[str, list[str]] = {}
     with local_processes(options.workers) as executor:
         for label, law in track(list(list_laws(options).items()), "options", transient=True):
-            lines[label] = describe(fly_all(preset, options, law, executor))
+            lines[label] = describe(fly_all(study, options.sites, law, executor))
     heads = ("safe site %", "success %", "propellant %", "speed p50 m/s", "p99", "max", "looks", "fallbacks")
     table = Table(title=f"{options.sites} on {preset.name}, {options.episodes} tuning episodes")
     for head in ("guidance", *heads):
