@@ -113,18 +113,7 @@ def assess_safety(
     criteria = SafetyCriteria(footprint_diameter, pad_diameter, max_slope, max_roughness, range_noise)
     pixel_size = finite_number("pixel_size", pixel_size, above=0.0)
     elevation = elevation_array(dem)
-    side = min(elevation.shape)
-    if criteria.footprint_diameter > (side + 1) * pixel_size:  # before a large footprint is laid out
-        raise ValueError(
-            f"dem must hold the lander, {criteria.footprint_diameter:g} m wide, got {side} cells of"
-            f" {pixel_size:g} m"
-        )
-    footprint = make_footprint(criteria.footprint_diameter, criteria.pad_diameter, pixel_size)
-    if side < footprint.span:
-        raise ValueError(
-            f"dem must have at least {footprint.span} x {footprint.span} cells to hold the lander, "
-            f"got {elevation.shape[0]} x {elevation.shape[1]}"
-        )
+    footprint = _fit_footprint(criteria, pixel_size, elevation.shape)
     hole = np.isnan(elevation)
     elevation[hole] = 0.0  # any number: what it touches is marked unknown below
     slope, roughness, excess = _worst_case(elevation, footprint, pixel_size, criteria.max_roughness)
@@ -165,6 +154,27 @@ def elevation_array(dem: ArrayLike) -> NDArray[np.float64]:
             f" {np.nanmin(elevation):g} to {np.nanmax(elevation):g} m"
         )
     return elevation
+
+
+def _fit_footprint(criteria: SafetyCriteria, pixel_size: float, shape: tuple[int, ...]) -> LanderFootprint:
+    """The lander on the raster of a DEM, shape (m, n).
+
+    Raises:
+        ValueError: the DEM is smaller than the lander, or the lander is too small for the pixel size.
+    """
+    side = min(shape)
+    if criteria.footprint_diameter > (side + 1) * pixel_size:  # before a large footprint is laid out
+        raise ValueError(
+            f"dem must hold the lander, {criteria.footprint_diameter:g} m wide, got {side} cells of"
+            f" {pixel_size:g} m"
+        )
+    footprint = make_footprint(criteria.footprint_diameter, criteria.pad_diameter, pixel_size)
+    if side < footprint.span:
+        raise ValueError(
+            f"dem must have at least {footprint.span} x {footprint.span} cells to hold the lander, "
+            f"got {shape[0]} x {shape[1]}"
+        )
+    return footprint
 
 
 def _known_sites(hole: NDArray[np.bool_], footprint: LanderFootprint) -> NDArray[np.bool_]:
