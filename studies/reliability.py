@@ -8,6 +8,7 @@ NASA/TP-2010-216447).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -42,13 +43,7 @@ def exact_interval(successes: int, episodes: int, confidence: float = 0.95) -> I
     Raises:
         ValueError: an argument is out of range.
     """
-    from scipy.stats import binomtest
-
-    finite_number("episodes", episodes, at_least=1)
-    finite_number("successes", successes, at_least=0, at_most=episodes)
-    level = finite_number("confidence", confidence, above=0.0, at_most=0.9999)
-    ends = binomtest(successes, episodes).proportion_ci(confidence_level=level, method="exact")
-    return Interval(successes / episodes, float(ends.low), float(ends.high))
+    return _clopper_pearson(successes, episodes, confidence, "two-sided")
 
 
 def exact_lower_bound(successes: int, episodes: int, confidence: float = 0.9) -> float:
@@ -62,13 +57,20 @@ def exact_lower_bound(successes: int, episodes: int, confidence: float = 0.9) ->
     Raises:
         ValueError: an argument is out of range.
     """
+    return _clopper_pearson(successes, episodes, confidence, "greater").low
+
+
+def _clopper_pearson(
+    successes: int, episodes: int, confidence: float, alternative: Literal["two-sided", "greater"]
+) -> Interval:
     from scipy.stats import binomtest
 
     finite_number("episodes", episodes, at_least=1)
     finite_number("successes", successes, at_least=0, at_most=episodes)
     level = finite_number("confidence", confidence, above=0.0, at_most=0.9999)
-    test = binomtest(successes, episodes, alternative="greater")
-    return float(test.proportion_ci(confidence_level=level, method="exact").low)
+    test = binomtest(successes, episodes, alternative=alternative)
+    ends = test.proportion_ci(confidence_level=level, method="exact")
+    return Interval(successes / episodes, float(ends.low), float(ends.high))
 
 
 def allowed_failures(episodes: int, share: float, confidence: float = 0.9) -> int | None:
