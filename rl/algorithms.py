@@ -6,7 +6,9 @@ import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
-from rl.action import ActionRanges
+import numpy as np
+
+from rl.action import CONTROLS, ActionRanges
 from rl.encoding import CURVED, PRINTED
 
 if TYPE_CHECKING:
@@ -40,7 +42,7 @@ class AgentSettings:
             only; see `rl.td3.FastTD3`).
         prior_weight: of the penalty that draws an actor to the nominal action where the critic sees no
             difference (td3 only; see `rl.td3.FastTD3`).
-        control_prior_weight: of such a penalty on the gains and the clock alone (td3 only).
+        control_prior_weight: of such a penalty on the gains and the clock alone (td3 and those with memory).
         control_prior_step: environment step from which it holds: first free, then settled.
         smoothing_share: the target actor's actions are smoothed by this share of the exploration noise, at
             most 0.2; None is 0.2 throughout (td3 and those with memory; see `rl.td3.FastTD3`).
@@ -112,12 +114,13 @@ class RecurrentSettings(AgentSettings):
     algorithm: AlgorithmName = "td3-lstm"
     hidden: tuple[int, ...] = (256,)
     learning_rate_decay: tuple[int, int] = (50_000, 150_000)
-    batch_size: int = 100
+    batch_size: int = 32
     noise_decay: tuple[int, int] = (25_000, 75_000)
+    control_prior_step: int = 110_000
     random_steps: int = 10_000
     replay_size: int = 200_000
     memory: int = 128
-    update_every: int = 2
+    update_every: int = 1
     window: int = 20
     burn_in: int = 0
 
@@ -171,7 +174,10 @@ def make_agent_with_memory(settings: RecurrentSettings, env: Any, seed: int) -> 
         plus=settings.algorithm == "td3-lstm-plus", head=settings.hidden, **chosen
     )
     schedules = (settings.learning_rate_at, settings.noise_at, settings.smoothing_noise_at)
-    return RecurrentTD3(env, hyperparameters, seed, *schedules)
+    agent = RecurrentTD3(env, hyperparameters, seed, *schedules)
+    controls = np.arange(agent.sizes.action) < CONTROLS
+    agent.action_prior = lambda step: settings.control_prior_at(step) * controls.astype(np.float32)
+    return agent
 
 
 def make_algorithm(settings: AgentSettings, env: Any, seed: int) -> OffPolicyAlgorithm | RecurrentTD3:

@@ -126,8 +126,18 @@ def critic_loss(
     return loss
 
 
-def actor_loss(networks: ActorCritic, batch: SequenceTensors, settings: Hyperparameters) -> Tensor:
-    """Mean of -Q_1(h_t, mu(h_t)) and the penalties over the transitions that count."""
+def actor_loss(
+    networks: ActorCritic, batch: SequenceTensors, settings: Hyperparameters, prior: Tensor | None = None
+) -> Tensor:
+    """Mean of -Q_1(h_t, mu(h_t)) and the penalties over the transitions that count.
+
+    Args:
+        networks: learning and target networks.
+        batch: T transitions of N sequences.
+        settings: weights of the penalties.
+        prior: (a,), weights of one more penalty for the squares of the inputs of the actor's tanh, by
+            element; None for none.
+    """
     inputs, _ = networks.actor(batch.observations[:-1], batch.history[:-1])
     with torch.no_grad():  # the past holds no action of this actor
         pasts = networks.critic.remember(batch.history[:-1], count=1)
@@ -138,4 +148,6 @@ def actor_loss(networks: ActorCritic, batch: SequenceTensors, settings: Hyperpar
         loss = loss + settings.saturation_weight * batch.mean(excess.square().sum(-1))
     if settings.prior_weight > 0.0:
         loss = loss + settings.prior_weight * batch.mean(inputs.square().sum(-1))
+    if prior is not None:
+        loss = loss + batch.mean((prior * inputs.square()).sum(-1))
     return loss

@@ -23,13 +23,14 @@ Deviations of the printed variant from Algorithm 3 as printed:
    zero and not random, since there is none.
 7. The loss as printed trains both critics through one Q; here each has its own error.
 8. The first `random_steps` have uniform actions; exploration noise, target smoothing and learning rate may
-   decay; values may be clipped to what a return can be; and two penalties (0 switches them off) keep the
-   actor off the ends of its range. See `Hyperparameters`.
+   decay; values may be clipped to what a return can be; and penalties (0 switches them off) keep the actor
+   off the ends of its range and near 0. See `Hyperparameters` and `RecurrentTD3.action_prior`.
 9. Truncated episodes keep the value of their last observation; d = 1 only where the task itself ended.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -52,6 +53,8 @@ class RecurrentTD3(RecurrentAgent):
         env: what it learns from.
         learning_rate: of Adam, at an environment step.
         smoothing_noise: standard deviation of the noise on the target actor's actions, at one.
+        action_prior: weights, shape (a,), of one more penalty that draws each element of the actor's action
+            to 0, at one; None for none.
         logger: with `record(name, value)`; None for none.
     """
 
@@ -81,6 +84,7 @@ class RecurrentTD3(RecurrentAgent):
         super().__init__(env, settings, seed, exploration_noise)
         self.env, self.seed = env, seed
         self.learning_rate, self.smoothing_noise = learning_rate, smoothing_noise
+        self.action_prior: Callable[[int], Array] | None = None
         rate = learning_rate(0)
         self.actor_optimizer = torch.optim.Adam(self.actor.parameters(), lr=rate, fused=True)
         self.critic_optimizer = torch.optim.Adam(self.critic.parameters(), lr=rate, fused=True)
@@ -213,7 +217,9 @@ class RecurrentTD3(RecurrentAgent):
 
     def _update_actor(self, batch: SequenceTensors) -> float:
         self.critic.requires_grad_(False)
-        loss = actor_loss(self.networks, batch, self.settings)
+        prior = None if self.action_prior is None else self.action_prior(self.num_timesteps)
+        weights = None if prior is None or not prior.any() else torch.from_numpy(prior)
+        loss = actor_loss(self.networks, batch, self.settings, weights)
         self.actor_optimizer.zero_grad()
         loss.backward()
         self.actor_optimizer.step()
