@@ -22,7 +22,7 @@ it. The times of flight and p are searched on a grid refined by golden sections,
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,10 +30,9 @@ from numpy.typing import NDArray
 from guidance.kernel import compile_kernel
 from guidance.state import State
 from hda.observation import Observation, ScenarioView
-from hda.policies.oracle_fuel import cheapest_clear_site
+from hda.policies.oracle_fuel import CheapestSafeSite
 from hda.scenario import Rules, Scenario
 from hda.site_selection import Site
-from hda.tile import Tile
 
 Array = NDArray[np.float64]
 
@@ -268,31 +267,14 @@ def least_propellant(scenario: Scenario) -> float:
     return burnt / (state.mass - view.lander.dry_mass)
 
 
-@dataclass(frozen=True, eq=False)
-class BestKnownSite:
-    """Privileged: the cheapest truly safe site if a flight could have seen it, else the nearest such one.
+class BestKnownSite(CheapestSafeSite):
+    """Privileged: the cheapest truly safe site if a flight could have seen it, else the nearest such one."""
 
-    Attributes:
-        truth: the tile that is being flown.
-        clearance: [m] of safe ground around the site.
-    """
-
-    truth: Tile = field(repr=False)
-    clearance: float = 2.0
-
-    def begin(self, view: ScenarioView) -> tuple[ScenarioView, Site | None]:
-        """No site yet."""
-        return view, None
-
-    def select(
-        self, observation: Observation, memory: tuple[ScenarioView, Site | None]
-    ) -> tuple[Site, tuple[ScenarioView, Site]]:
-        """Choose at the first look, then stay; the first target where nothing could have been known."""
-        view, site = memory
-        if site is None:
-            ground = KnowableGround(observation.state, observation.target, observation.width, view)
-            site = cheapest_clear_site(self.truth, observation, view, self.clearance)
-            if not ground.contains(site):
-                known = nearest_known_site(ground, self.truth.deterministic)
-                site = observation.target if known is None else known
-        return site, (view, site)
+    def choose(self, observation: Observation, view: ScenarioView) -> Site:
+        """The first target where nothing could have been known."""
+        ground = KnowableGround(observation.state, observation.target, observation.width, view)
+        site = super().choose(observation, view)
+        if ground.contains(site):
+            return site
+        known = nearest_known_site(ground, self.truth.deterministic)
+        return observation.target if known is None else known

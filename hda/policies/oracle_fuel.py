@@ -66,7 +66,7 @@ class CheapestSafeSite:
     truth: Tile = field(repr=False)
     clearance: float = 2.0
 
-    def begin(self, view: ScenarioView) -> tuple[ScenarioView, NDArray[np.float64] | None]:
+    def begin(self, view: ScenarioView) -> tuple[ScenarioView, Site | None]:
         """No site yet; the map of clearances is made here, once per tile."""
         load_kernels()
         safe_clearance(self.truth)
@@ -78,5 +78,9 @@ class CheapestSafeSite:
         """Choose at the first look, then stay."""
         view, site = memory
         if site is None:
-            site = cheapest_clear_site(self.truth, observation, view, self.clearance)
+            site = self.choose(observation, view)
         return site, (view, site)
+
+    def choose(self, observation: Observation, view: ScenarioView) -> Site:
+        """The cheapest site, from the first look's state."""
+        return cheapest_clear_site(self.truth, observation, view, self.clearance)
