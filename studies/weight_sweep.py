@@ -9,7 +9,8 @@ from dataclasses import fields, replace
 
 from hda.policies.adjusted_descent import AdjustedDescent
 from hda.policies.composition import ComposedPolicy
-from hda.policies.hazard_aware import HazardAwareSite, HazardAwareWeights
+from hda.policies.hazard_aware import HazardAwareSite
+from hda.policies.site_price import HazardAwareWeights
 from hda.presets import unknown_name
 
 SWEEP: dict[str, tuple[float, ...]] = {

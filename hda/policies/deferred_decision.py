@@ -21,8 +21,9 @@ from guidance.validation import finite_number
 from hda.belief import SafetyBelief
 from hda.observation import Observation, ScenarioView
 from hda.policies.adjusted_descent import AdjustedDescent
-from hda.policies.hazard_aware import HazardAwareSite, HazardAwareWeights, fuse_look, landing_probability
+from hda.policies.hazard_aware import HazardAwareSite, fuse_look
 from hda.policies.planned_descent import DescentMemory
+from hda.policies.site_price import HazardAwareWeights, landing_probability
 from hda.policy import Decision, DecisionStatus, PlanCommand
 from hda.surroundings import infer_unseen
 

@@ -1,74 +1,36 @@
-"""Hazard-aware choice of the landing site: risk by the belief, propellant, and what the next look may show.
+"""Hazard-aware choice of the landing site: fuse every look, price every cell, fly to the cheapest.
 
-At each look every cell of the belief's square is priced in kilogrammes of propellant:
-
-    J = propellant + (1 - safe) (divert + failure exp(-(known/surprise + unknown/island)))
-
-`safe` is the probability that a touchdown aimed at the cell ends on safe ground, under the landing
-dispersion. Should the site turn out unsafe, a later look must show another: `known` is the expected safe
-ground, among cells that are probably safe, within reach of a late divert from it, and `unknown` the expected
-safe ground among the others, within the field of view that the next look will have around it and not too far
-from the vertical. Unknown safe ground comes in islands, so exp(-unknown/island) is the Poisson probability
-that there is none; known ground is lost to surprises of a few square metres. Where no look is left to act
-on, the exponential is one. The site of least J is flown to; the present one is kept unless another gains.
+The objective stands in `hda.policies.site_price`. The site of least J is flown to; the present one is kept
+unless another gains.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from guidance.constants import MOON_GRAVITY
-from guidance.kernel import compile_kernel
 from guidance.lander import Lander
 from guidance.state import State
-from guidance.two_impulse import divert_cost
-from guidance.validation import finite_number
 from hda.belief import SafetyBelief
 from hda.lidar import Lidar
 from hda.observation import Observation, ScenarioView
+from hda.policies.site_price import (
+    LATTICE,
+    HazardAwareWeights,
+    predict_next_look,
+    price_sites,
+    propellant_map,
+)
 from hda.surroundings import infer_unseen
 
 Array = NDArray[np.float64]
 
-_LATTICE = 8  # [m] spacing at which propellant is estimated; it bends over hundreds of metres
 _SQUARE = 1.25  # half side of the belief's square in widths of the first look
-
-
-@dataclass(frozen=True)
-class HazardAwareWeights:
-    """What the objective weighs; tuned on the tuning tiles.
-
-    Attributes:
-        failure_cost: [kg] of propellant that a failed landing is worth.
-        divert_cost: [kg] of propellant that a late divert is expected to cost.
-        surprise_area: [m^2] of known safe ground in reach that lowers the risk by a factor e.
-        island_area: [m^2] of expected safe ground not yet seen that lowers the risk by a factor e.
-        divert_slope: [-] reach of a late divert over the height at the next look.
-        dispersion: [m] standard deviation of the touchdown about the site, along each axis.
-        switch_gain: [kg] by which another site must be better than the present one.
-        commit_time: [s] with less time to go than this the site is kept, and a look is of no more use.
-    """
-
-    failure_cost: float = 2000.0
-    divert_cost: float = 2.0
-    surprise_area: float = 10.0
-    island_area: float = 500.0
-    divert_slope: float = 0.04
-    dispersion: float = 0.3
-    switch_gain: float = 0.05
-    commit_time: float = 2.5
-
-    def __post_init__(self) -> None:
-        """Refuse weights that mean nothing."""
-        for name in ("failure_cost", "divert_cost", "divert_slope", "switch_gain", "commit_time"):
-            finite_number(name, getattr(self, name), at_least=0.0)
-        for name in ("surprise_area", "island_area", "dispersion"):
-            finite_number(name, getattr(self, name), above=0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,194 +46,10 @@ class HazardAwareMemory:
     belief: SafetyBelief | None = None
 
 
-@dataclass(frozen=True)
-class NextLook:
-    """Where the lander will be at the next look, coasting until then; lengths from the square's corner.
-
-    Attributes:
-        east: [m].
-        north: [m].
-        height: [m] above the plane.
-        half_width_slope: half the look's width over the slant range.
-        nadir_radius: [m] greatest distance from the point below the lander at which ground is seen.
-        useful: whether it comes early enough to act on.
-    """
-
-    east: float
-    north: float
-    height: float
-    half_width_slope: float
-    nadir_radius: float
-    useful: bool
-
-
-def predict_next_look(
-    observation: Observation, view: ScenarioView, corner: tuple[int, int], commit_time: float
-) -> NextLook:
-    """Coast for one decision interval."""
-    interval, state = view.decision_interval, observation.state
-    position = state.position + interval * (state.velocity + 0.5 * interval * view.gravity)
-    height = float(position[2] - observation.target[2])
-    return NextLook(
-        east=float(position[0]) - corner[0],
-        north=float(position[1]) - corner[1],
-        height=height,
-        half_width_slope=0.5 * math.tan(view.lidar.field_of_view),
-        nadir_radius=max(height, 0.0) * math.tan(view.lidar.off_nadir_limit),
-        useful=observation.time_to_go - interval > commit_time and height > 0.0,
-    )
-
-
-def landing_probability(safe: NDArray[np.float32], dispersion: float) -> NDArray[np.float32]:
-    """Probability that a touchdown aimed at each cell's centre ends on a safe cell.
-
-    Args:
-        safe: shape (n, n), probability that each cell is safe.
-        dispersion: [m] standard deviation of the touchdown along each axis, Gaussian, up to 2.5 m.
-
-    Returns:
-        Shape (n, n); 0 within two cells of the square's edge.
-    """
-    edges = np.array([math.erf(edge / (dispersion * math.sqrt(2.0))) for edge in (0.5, 1.5, 2.5)])
-    share = np.diff(edges, prepend=0.0) * np.array([1.0, 0.5, 0.5]) / edges[-1]
-    out = np.empty_like(safe)
-    _smooth_into(safe, share, out)
-    return out
-
-
-@compile_kernel
-def _smooth_into(safe: NDArray[np.float32], share: Array, out: NDArray[np.float32]) -> None:
-    """Weighted mean over five cells along each axis; beyond the square nothing is safe."""
-    n = safe.shape[0]
-    across = np.zeros((n, n))
-    for row in range(n):
-        for column in range(2, n - 2):
-            total = share[0] * safe[row, column]
-            for step in (1, 2):
-                total += share[step] * (safe[row, column - step] + safe[row, column + step])
-            across[row, column] = total
-    out[:] = 0.0
-    for row in range(2, n - 2):
-        for column in range(n):
-            total = share[0] * across[row, column]
-            for step in (1, 2):
-                total += share[step] * (across[row - step, column] + across[row + step, column])
-            out[row, column] = total
-
-
-def propellant_map(observation: Observation, view: ScenarioView, belief: SafetyBelief) -> Array:
-    """[kg] estimate for landing at each lattice point of the square, shape (m, m)."""
-    points = np.arange(belief.looks.shape[0] // _LATTICE + 2) * float(_LATTICE)
-    return divert_cost(
-        observation.state,
-        belief.corner[0] + points,
-        belief.corner[1] + points,
-        float(observation.target[2]),
-        view.lander,
-        view.gravity,
-    )
-
-
-def summed_area(density: NDArray[np.float32]) -> Array:
-    """Integral image, shape (n + 1, n + 1): entry (i, j) is the sum over rows below i and columns below j."""
-    out = np.zeros((density.shape[0] + 1, density.shape[1] + 1))
-    _sum_into(density, out)
-    return out
-
-
-@compile_kernel
-def _sum_into(density: NDArray[np.float32], out: Array) -> None:
-    rows, columns = density.shape
-    below = np.zeros(columns)
-    for row in range(rows):
-        total = 0.0
-        for column in range(columns):
-            below[column] += density[row, column]
-            total += below[column]
-            out[row + 1, column + 1] = total
-
-
-@compile_kernel
-def _box(area: Array, row: int, column: int, half: float) -> float:
-    """Sum over the cells within `half` of a cell along each axis."""
-    n = area.shape[0] - 1
-    reach = int(half)
-    low_row, high_row = max(row - reach, 0), min(row + reach + 1, n)
-    low, high = max(column - reach, 0), min(column + reach + 1, n)
-    return area[high_row, high] - area[low_row, high] - area[high_row, low] + area[low_row, low]
-
-
-@compile_kernel
-def _price_cells(
-    landing: NDArray[np.float32],
-    areas: tuple[Array, Array],
-    propellant: Array,
-    next_look: tuple[float, float, float, float, bool],
-    weights: tuple[float, float, float, float, float],
-    out: NDArray[np.float64],
-) -> None:
-    """Fill J; see the module's docstring."""
-    known_area, unknown_area = areas
-    east, north, height, half_width_slope, useful = next_look
-    failure, divert, surprise, island, divert_slope = weights
-    n = landing.shape[0]
-    for row in range(n):
-        for column in range(n):
-            down, right = (row + 0.5) / _LATTICE, (column + 0.5) / _LATTICE
-            i, j = int(down), int(right)
-            s, t = down - i, right - j
-            price = (1.0 - s) * ((1.0 - t) * propellant[i, j] + t * propellant[i, j + 1])
-            price += s * ((1.0 - t) * propellant[i + 1, j] + t * propellant[i + 1, j + 1])
-            exponent = 0.0
-            if useful:
-                reach = max(divert_slope * height, 1.0)
-                across = (column + 0.5 - east) ** 2 + (row + 0.5 - north) ** 2
-                half_width = half_width_slope * math.sqrt(across + height * height)
-                exponent = _box(known_area, row, column, reach) / surprise
-                exponent += _box(unknown_area, row, column, half_width) / island
-            risk = 1.0 - landing[row, column]
-            out[row, column] = price + risk * (divert + failure * math.exp(-exponent))
-
-
-def price_sites(
-    safe: NDArray[np.float32], propellant: Array, next_look: NextLook, weights: HazardAwareWeights
-) -> Array:
-    """[kg] J of every cell, shape (n, n).
-
-    Args:
-        safe: shape (n, n), probability that each cell is safe.
-        propellant: [kg] on the lattice.
-        next_look: what it will be able to see.
-        weights: of the objective.
-    """
-    n = safe.shape[0]
-    axis = np.arange(n) + 0.5
-    across = (axis[:, None] - next_look.north) ** 2 + (axis[None, :] - next_look.east) ** 2
-    likely = safe > 0.5
-    known = np.where(likely, safe, np.float32(0.0))
-    unknown = np.where(~likely & (across <= next_look.nadir_radius**2), safe, np.float32(0.0))
-    out = np.empty((n, n))
-    _price_cells(
-        landing_probability(safe, weights.dispersion),
-        (summed_area(known), summed_area(unknown)),
-        propellant,
-        (next_look.east, next_look.north, next_look.height, next_look.half_width_slope, next_look.useful),
-        (
-            weights.failure_cost,
-            weights.divert_cost,
-            weights.surprise_area,
-            weights.island_area,
-            weights.divert_slope,
-        ),
-        out,
-    )
-    return out
-
-
 def fuse_look(observation: Observation, view: ScenarioView, belief: SafetyBelief | None) -> SafetyBelief:
     """The belief after a look; the first look fixes the square."""
     if belief is None:
-        half_side = math.ceil(_SQUARE * observation.width / _LATTICE) * _LATTICE
+        half_side = math.ceil(_SQUARE * observation.width / LATTICE) * LATTICE
         belief = SafetyBelief.blank(observation.target, half_side)
     return belief.fused(observation, view.lidar)
 
@@ -284,7 +62,7 @@ class HazardAwareSite:
         weights: of the objective.
     """
 
-    weights: HazardAwareWeights = HazardAwareWeights()
+    weights: HazardAwareWeights = field(default_factory=HazardAwareWeights)
 
     def begin(self, view: ScenarioView) -> HazardAwareMemory:
         """Nothing seen yet."""
@@ -323,5 +101,5 @@ def load_kernels() -> None:
     state = State(np.array([0.0, 0.0, 100.0]), np.zeros(3), 1200.0)
     reading = np.ones((lidar.pixels, lidar.pixels), dtype=np.float32)
     observation = Observation(0, 0.0, state, plane, reading, 16.0, 20.0)
-    belief = SafetyBelief.blank(plane, 2 * _LATTICE).fused(observation, lidar)
+    belief = SafetyBelief.blank(plane, 2 * LATTICE).fused(observation, lidar)
     HazardAwareSite().price(observation, view, belief)

@@ -14,9 +14,8 @@ from guidance.two_impulse import divert_cost
 from hda.belief import SafetyBelief
 from hda.episode import begin_flight, fly, observe
 from hda.observation import Observation
-from hda.policies.hazard_aware import (
-    HazardAwareMemory,
-    HazardAwareSite,
+from hda.policies.hazard_aware import HazardAwareMemory, HazardAwareSite
+from hda.policies.site_price import (
     HazardAwareWeights,
     NextLook,
     landing_probability,
