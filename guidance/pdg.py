@@ -54,10 +54,9 @@ def solve_pdg(
         speed_limit: [m/s] greatest speed.
         time_of_flight: [s] None searches for the best.
         nodes: N; the plan has N - 1 intervals of equal duration.
-        method: 'convex' (lossless convexification in Clarabel; fast), 'cvxpy' (the same problem, written for
-            reading) or 'casadi' (the unrelaxed nonconvex problem by fatrop or IPOPT). Where the relaxation
-            breaks min_thrust or the pointing limit, 'convex' asks 'casadi' too: `plan.method` tells whose
-            flight it is, `plan.message` why.
+        method: 'convex' (lossless convexification in Clarabel; where that loses min_thrust or the pointing
+            limit it asks 'casadi', and `plan.method` says so), 'cvxpy' (the same problem, for reading) or
+            'casadi' (the unrelaxed nonconvex problem by fatrop or IPOPT).
         unreachable: what to do where the target is out of reach: 'raise', or plan to the softly reachable
             point 'nearest' to it in its plane (always by the convex method).
         guess: an earlier Plan of nearly the same flight: what is left of it seeds the search where the
@@ -80,16 +79,21 @@ def solve_pdg(
         glide_slope_limit,
         speed_limit,
     )
+    time_of_flight = (
+        None if time_of_flight is None else finite_number("time_of_flight", time_of_flight, above=0.0)
+    )
     _check_choices(nodes, method, unreachable, guess)
-    if time_of_flight is not None:
-        time_of_flight = finite_number("time_of_flight", time_of_flight, above=0.0)
     plan = _plan(problem, nodes, time_of_flight, method, guess)
     if plan.status is not PlanStatus.OPTIMAL:
         plan = _without_flight(plan, nodes, time_of_flight, unreachable)
     if throw and not plan.status.has_flight:
-        kind = InfeasibleError if plan.status is PlanStatus.INFEASIBLE else SolverFailedError
-        raise kind(f"{plan.status.value}: {plan.message}", plan)
+        raise _error(plan)
     return plan
+
+
+def _error(plan: Plan) -> InfeasibleError | SolverFailedError:
+    kind = InfeasibleError if plan.status is PlanStatus.INFEASIBLE else SolverFailedError
+    return kind(f"{plan.status.value}: {plan.message}", plan)
 
 
 def _check_choices(nodes: int, method: str, unreachable: str, guess: Plan | None) -> None:
