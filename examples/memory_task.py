@@ -54,21 +54,24 @@ def mean_reward(agent: RecurrentTD3) -> float:
     return total
 
 
+SETTINGS = Hyperparameters(
+    plus=True,
+    memory=16,
+    head=(32,),
+    batch_size=32,
+    random_steps=400,
+    update_every=2,
+    discount=0.95,
+    target_rate=0.02,
+    saturation_weight=0.1,
+)
+"""The modern variant, small."""
+
+
 def main() -> None:
-    """Train the modern variant for 1400 steps."""
-    settings = Hyperparameters(
-        plus=True,
-        memory=16,
-        head=(32,),
-        batch_size=32,
-        random_steps=400,
-        update_every=2,
-        discount=0.95,
-        target_rate=0.02,
-        saturation_weight=0.1,
-    )
+    """Train it for 1400 steps."""
     agent = RecurrentTD3(
-        Recall(), settings, seed=0, learning_rate=lambda step: 3e-3, exploration_noise=lambda step: 0.3
+        Recall(), SETTINGS, seed=0, learning_rate=lambda step: 3e-3, exploration_noise=lambda step: 0.3
     )
     print(f"mean reward before: {mean_reward(agent):.2f}")  # noqa: T201 - an example talks
     agent.learn(1400)

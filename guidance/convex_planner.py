@@ -83,15 +83,14 @@ def _unrelaxed(lost: Plan, relaxed: ConvexSolution, time_of_flight: float | None
     """Ask the unrelaxed problem where relaxing lost something: from the relaxed flight, then from scratch."""
     from guidance.reference_casadi import plan_casadi
 
-    problem, plan = lost.problem, lost
+    problem, solves, message = lost.problem, lost.solves, lost.message
     flight = Plan.of_flight(PlanStatus.OPTIMAL, problem, METHOD, relaxed.trajectory(problem))
     for guess in (flight, None):
         found = plan_casadi(problem, flight.nodes, time_of_flight, guess)
-        solves, message = plan.solves + found.solves, f"{found.message}; {lost.message}"
+        solves, message = solves + found.solves, f"{found.message}; {lost.message}"
         if found.status.has_flight:
             return replace(found, solves=solves, message=message)
-        plan = replace(lost, solves=solves, message=message)
-    return plan
+    return replace(lost, solves=solves, message=message)
 
 
 def _shortage(problem: LandingProblem, solution: ConvexSolution) -> str:

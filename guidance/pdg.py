@@ -79,10 +79,9 @@ def solve_pdg(
         glide_slope_limit,
         speed_limit,
     )
-    time_of_flight = (
-        None if time_of_flight is None else finite_number("time_of_flight", time_of_flight, above=0.0)
-    )
     _check_choices(nodes, method, unreachable, guess)
+    if time_of_flight is not None:
+        time_of_flight = finite_number("time_of_flight", time_of_flight, above=0.0)
     plan = _plan(problem, nodes, time_of_flight, method, guess)
     if plan.status is not PlanStatus.OPTIMAL:
         plan = _without_flight(plan, nodes, time_of_flight, unreachable)
@@ -139,6 +138,8 @@ def _plan(
         from guidance.convex_planner import plan_convex
 
         convex = plan_convex(problem, nodes, time_of_flight)
+        if convex.status.has_flight and convex.method == plan.method:  # relaxing lost: it has asked already
+            return replace(convex, solves=plan.solves + convex.solves)
         if convex.status.has_flight:  # the case is feasible: the local solver had a poor start
             again = plan_casadi(problem, nodes, time_of_flight, convex)
             return replace(again, solves=plan.solves + convex.solves + again.solves)

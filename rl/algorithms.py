@@ -175,8 +175,8 @@ def make_agent_with_memory(settings: RecurrentSettings, env: Any, seed: int) -> 
     )
     schedules = (settings.learning_rate_at, settings.noise_at, settings.smoothing_noise_at)
     agent = RecurrentTD3(env, hyperparameters, seed, *schedules)
-    controls = np.arange(agent.sizes.action) < CONTROLS
-    agent.action_prior = lambda step: settings.control_prior_at(step) * controls.astype(np.float32)
+    controls = (np.arange(agent.sizes.action) < CONTROLS).astype(np.float32)
+    agent.action_prior = lambda step: settings.control_prior_at(step) * controls
     return agent
 
 

@@ -16,6 +16,7 @@ from __future__ import annotations
 import shlex
 import subprocess
 import sys
+from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Literal
@@ -159,14 +160,12 @@ def study_memory(options: MemoryStudy) -> tuple[GroupRow, ...]:
         for score in scores
         if score.unfinished
     ]
-    found = {(score.preset, score.agent): 0 for score in scores}
-    for score in scores:
-        found[score.preset, score.agent] += 1
+    found = Counter((score.preset, score.agent) for score in scores)
     sentences += [
-        f"{agent} on {preset} has {found.get((preset, agent), 0)} of {options.seeds} seeds."
+        f"{agent} on {preset} has {found[preset, agent]} of {options.seeds} seeds."
         for preset in options.presets
         for agent in options.agents
-        if found.get((preset, agent), 0) < options.seeds
+        if found[preset, agent] < options.seeds
     ]
     write_csv(out / "memory.csv", rows)
     text = markdown(rows, sentences)

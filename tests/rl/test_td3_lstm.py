@@ -10,7 +10,7 @@ import pytest
 import torch
 from gymnasium import spaces
 
-from examples.memory_task import Recall
+from examples.memory_task import SETTINGS, Recall
 from hda.episode import fly
 from hda.presets import PRESETS, sample_scenario
 from rl.actor_export import actor_card, actor_tensors, policy_of
@@ -18,7 +18,6 @@ from rl.algorithms import RECURRENT_RECIPES, make_agent_with_memory
 from rl.artefacts import Artefact, ArtefactError, load_artefact, save_artefact
 from rl.env import LunarHDAEnv
 from rl.recurrent_agent import AgentMemory
-from rl.recurrent_hyperparameters import Hyperparameters
 from rl.recurrent_losses import SequenceTensors, actor_loss, critic_loss
 from rl.recurrent_policy import RecurrentAgentPolicy, load_memory_actor
 from rl.replay import Episode
@@ -63,18 +62,7 @@ def mean_recall(agent) -> float:
 
 @pytest.mark.parametrize("plus", [False, True])
 def test_memory_solves_a_task_that_needs_it(plus):
-    settings = Hyperparameters(
-        plus=plus,
-        memory=16,
-        head=(32,),
-        batch_size=32,
-        random_steps=400,
-        update_every=2,
-        discount=0.95,
-        target_rate=0.02,
-        saturation_weight=0.1,
-    )
-    agent = RecurrentTD3(WideRecall(), settings, 0, lambda step: 3e-3, lambda step: 0.3)
+    agent = RecurrentTD3(WideRecall(), replace(SETTINGS, plus=plus), 0, lambda step: 3e-3, lambda step: 0.3)
     agent.learn(1400)
     assert mean_recall(agent) > 0.8
 
