@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from hda.policies.adjusted_descent import AdjustedDescent
 from hda.policies.composition import ComposedPolicy
-from hda.policies.planned_descent import PlannedDescent
 from hda.policies.zem_zev import FixedGainZemZev
 from hda.registry import PolicyEntry
 from rl.policy import AgentPolicy, AgentSite, shipped
@@ -16,9 +16,6 @@ _AGENTS = {
     "td3-lstm-plus": "the same with one masked memory, the last reward in the history, an encoder per role",
     "td3-paper": "the plain recipe: the printed observation vector, TD3 as its authors published it",
 }
-
-
-_LATE_MOVE = 2.5  # [m] which no plan is made anew for in the last seconds; chosen on the tuning tiles
 
 
 def _agent(name: str) -> PolicyEntry:
@@ -43,9 +40,7 @@ _ENTRIES = (
         "td3",
         PolicyEntry(
             "td3+convex",
-            lambda: ComposedPolicy(
-                "td3+convex", AgentSite(shipped("td3")), PlannedDescent(site_tolerance=_LATE_MOVE)
-            ),
+            lambda: ComposedPolicy("td3+convex", AgentSite(shipped("td3")), AdjustedDescent()),
             "the sites of td3, flown by convex guidance",
         ),
     ),

@@ -44,14 +44,11 @@ class PlannedDescent:
         options: how plans are made.
         weights: feedback about them.
         commit_time: [s] with less time left than this, and the same site, the last plan flies on as it is.
-        site_tolerance: [m] for that, a site no farther than this from the planned one is the same. An agent
-            that moves its target a little at each look would else have it hover for every centimetre.
     """
 
     options: SoftLandingOptions = DEFAULT_OPTIONS
     weights: TrackingWeights = DEFAULT_WEIGHTS
     commit_time: float = 10.0
-    site_tolerance: float = 0.0
 
     def begin(self, view: ScenarioView) -> DescentMemory:
         """No plan yet; the planner is made ready here, so that the first decision does not wait for it."""
@@ -62,9 +59,9 @@ class PlannedDescent:
         self, observation: Observation, site: NDArray[np.float64], memory: DescentMemory
     ) -> tuple[Command, DecisionStatus, DescentMemory]:
         """Replan, or fly on."""
-        moved = np.inf if memory.site is None else float(np.linalg.norm(site - memory.site))
-        left, same_site = memory.reference, moved == 0.0
-        if moved <= self.site_tolerance and left is not None and left.duration <= self.commit_time:
+        left = memory.reference
+        same_site = memory.site is not None and np.array_equal(site, memory.site)
+        if same_site and left is not None and left.duration <= self.commit_time:
             return self._track(left, DecisionStatus.NOMINAL, memory)
         landing = self._plan(observation, site, memory, left if same_site else None)
         if same_site and left is not None and (landing is None or landing.reference is None):

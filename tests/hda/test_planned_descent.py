@@ -92,20 +92,3 @@ def test_the_same_site_is_tracked_to_the_end_without_a_new_plan() -> None:
     assert isinstance(before, PlanCommand)
     np.testing.assert_array_equal(last.reference.position[-1], before.reference.position[-1])
     assert record.fallbacks == 0
-
-
-@pytest.mark.parametrize(("moved", "kept"), [(0.0, True), (2.4, True), (2.6, False)])
-def test_a_late_move_within_the_tolerance_makes_no_new_plan(moved: float, kept: bool) -> None:
-    scenario = scenario_of(0)
-    law = PlannedDescent(site_tolerance=2.5, commit_time=60.0)
-    look = observe(scenario, begin_flight(scenario))
-    _, _, memory = law.command(look, scenario.nominal_target, law.begin(scenario.view))
-    assert memory.reference is not None
-    left = memory.reference
-    later = replace(look, state=State(left.position[0], left.velocity[0], 1199.0))
-    command, status, after = law.command(later, scenario.nominal_target + np.array([0.0, moved, 0.0]), memory)
-    assert status is DecisionStatus.NOMINAL
-    assert isinstance(command, PlanCommand)
-    assert np.array_equal(command.reference.position[-1], memory.reference.position[-1]) is kept
-    assert after.site is not None
-    assert np.array_equal(after.site, scenario.nominal_target) is kept
