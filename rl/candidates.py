@@ -8,7 +8,9 @@ arXiv 1803.05407).
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
+from multiprocessing import get_context
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -70,19 +72,63 @@ def average_tensors(actors: Sequence[Tensors]) -> Tensors:
     return {name: np.mean([actor[name] for actor in actors], axis=0).astype(np.float32) for name in actors[0]}
 
 
-def best_of_run(run: Path, seed: int, preset: Preset, settings: AgentSettings, choice: Choice) -> Candidate:
+@dataclass(frozen=True, eq=False)
+class _Flights:
+    """Weights over the first episodes of a study on the tuning tiles."""
+
+    tensors: Tensors
+    settings: AgentSettings
+    preset: Preset
+    study_seed: int
+    episodes: int
+
+    def score(self) -> Score:
+        from rl.actor_export import policy_of
+        from rl.scoring import score_policy
+
+        policy = policy_of(self.tensors, self.settings)
+        return score_policy(policy, self.preset, "tuning", self.study_seed, self.episodes)
+
+
+def _score_all(flights: Sequence[_Flights], workers: int, task: str) -> list[Score]:
+    """Score each, in processes, with a bar; the order of the flights is kept."""
+    from rich.progress import Progress
+
+    with Progress() as progress:
+        bar = progress.add_task(task, total=len(flights))
+        if workers == 1 or len(flights) < 2:
+            scores = []
+            for flight in flights:
+                scores.append(flight.score())
+                progress.advance(bar)
+            return scores
+        with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+            futures = [pool.submit(flight.score) for flight in flights]
+            for _ in as_completed(futures):
+                progress.advance(bar)
+            return [future.result() for future in futures]
+
+
+def best_of_run(
+    run: Path, preset: Preset, settings: AgentSettings, choice: Choice, workers: int
+) -> Candidate:
     """The best weights of one run.
 
     All windows of successive actors fly the episodes of the periodic validation; the best fly more episodes,
     drawn with another seed, and the best of these is chosen: successes first, then the reward.
 
+    Args:
+        run: folder of the run.
+        preset: that it was trained on.
+        settings: that it was trained with.
+        choice: how candidates are judged.
+        workers: processes; the choice does not depend on them.
+
     Raises:
         ValueError: the run has no validated actor.
     """
-    from rl.actor_export import policy_of
     from rl.artefacts import load_artefact
-    from rl.run_folder import read_rows
-    from rl.scoring import score_policy
+    from rl.run_folder import read_rows, read_run
     from rl.training_recorder import TUNING_SEED
 
     rows = [row for row in read_rows(run / "validation.csv") if int(row["updates"]) > 0]
@@ -90,24 +136,27 @@ def best_of_run(run: Path, seed: int, preset: Preset, settings: AgentSettings, c
         raise ValueError(f"{run} has no validated actor")
     steps = [int(row["step"]) for row in rows]
     actors = [load_artefact(run / "actors" / f"step-{step:09d}", "actor").tensors for step in steps]
-    first = int(float(rows[0]["episodes"]))
-
-    def fly(window: slice, study_seed: int, episodes: int) -> Candidate:
-        tensors = average_tensors(actors[window])
-        score = score_policy(policy_of(tensors, settings), preset, "tuning", study_seed, episodes)
-        return Candidate(run, seed, tuple(steps[window]), tensors, score)
-
-    def rank(window: slice) -> tuple[float, float]:
-        if window.stop - window.start > 1:
-            return fly(window, TUNING_SEED, first).score.rank
-        row = rows[window.start]  # flown while it learnt
-        return float(row["success_percent"]), float(row["reward"])
-
     windows = [
         slice(end - length, end)
         for length in sorted(set(choice.averages))
         for end in range(length, len(actors) + 1)
     ]
-    ranked = sorted(windows, key=rank, reverse=True)
-    again = [fly(window, CHOICE_SEED, choice.episodes) for window in ranked[: choice.candidates]]
-    return max(again, key=lambda candidate: candidate.score.rank)
+
+    def flights(window: slice, study_seed: int, episodes: int) -> _Flights:
+        return _Flights(average_tensors(actors[window]), settings, preset, study_seed, episodes)
+
+    means = [window for window in windows if window.stop - window.start > 1]
+    first = [flights(window, TUNING_SEED, int(float(rows[0]["episodes"]))) for window in means]
+    ranks = {
+        (k, k + 1): (float(row["success_percent"]), float(row["reward"]))  # flown while it learnt
+        for k, row in enumerate(rows)
+    }
+    for window, score in zip(means, _score_all(first, workers, f"{run}: means of actors"), strict=True):
+        ranks[window.start, window.stop] = score.rank
+    windows.sort(key=lambda window: ranks[window.start, window.stop], reverse=True)
+    best = windows[: choice.candidates]
+    again = [flights(window, CHOICE_SEED, choice.episodes) for window in best]
+    scores = _score_all(again, workers, f"{run}: the best of them")
+    chosen, score = max(zip(best, scores, strict=True), key=lambda pair: pair[1].rank)
+    seed = int(read_run(run)["seed"])
+    return Candidate(run, seed, tuple(steps[chosen]), average_tensors(actors[chosen]), score)

@@ -26,6 +26,7 @@ class ExportWeights:
         name: of the weights: NAME.safetensors and NAME.json.
         choice: how the weights are chosen.
         validation_episodes: episodes on the validation tiles, flown once, for the card.
+        workers: processes that fly the candidates; the choice does not depend on them.
         out: folder.
     """
 
@@ -33,6 +34,7 @@ class ExportWeights:
     name: str
     choice: Annotated[Choice, tyro.conf.arg(name="")] = field(default_factory=Choice)
     validation_episodes: int = 1000
+    workers: int = 2
     out: Annotated[Path, tyro.conf.arg(metavar="DIR")] = field(default=WEIGHTS_FOLDER)
 
 
@@ -79,10 +81,11 @@ def run_export(options: ExportWeights) -> None:
     """Run the command.
 
     Raises:
-        ValueError: a folder is not a run, or the runs have different settings.
+        ValueError: an option is out of range, a folder is not a run, or the runs have different settings.
     """
     from rich.console import Console
 
+    from guidance.validation import finite_number
     from hda.dtm_library import Ground, prepare_tiles
     from hda.presets import find_preset
     from rl.actor_export import actor_card
@@ -90,6 +93,7 @@ def run_export(options: ExportWeights) -> None:
     from rl.run_folder import read_rows, read_run
     from rl.training_recorder import TUNING_SEED
 
+    finite_number("workers", options.workers, at_least=1)
     console = Console()
     cards = [read_run(run) for run in options.runs]
     first = cards[0]
@@ -99,8 +103,8 @@ def run_export(options: ExportWeights) -> None:
     for split in ("tuning", "validation"):
         prepare_tiles(Ground(preset.terrain, preset.criteria), split)
     best = []
-    for run, card in zip(options.runs, cards, strict=True):
-        best.append(best_of_run(run, card["seed"], preset, settings, options.choice))
+    for run in options.runs:
+        best.append(best_of_run(run, preset, settings, options.choice, options.workers))
         console.print(f"{run}: steps {best[-1].steps}, {best[-1].score.as_dict()}")
     chosen = max(best, key=lambda candidate: candidate.score.rank)
     seeds = [validate(candidate, preset, settings, options) for candidate in best]

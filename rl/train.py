@@ -41,7 +41,7 @@ class TrainAgent:
     seed: int = 0
     out: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
     preset: str = "paper"
-    steps: int = 270_000
+    steps: int = 275_000
     resume: bool = False
     validate_every: int = 10_000
     validation_episodes: int = 200

@@ -48,6 +48,7 @@ class MemoryStudy:
         train: list the commands of missing and unfinished runs, or run them first.
         episodes: that each run's actor flies over the validation tiles.
         choice: how a run's actor is chosen on the tuning tiles.
+        workers: processes that fly the candidates of a run.
         out: folder of the results.
     """
 
@@ -59,6 +60,7 @@ class MemoryStudy:
     train: Literal["no", "list", "run"] = "no"
     episodes: int = 1000
     choice: Annotated[Choice, tyro.conf.arg(name="")] = field(default_factory=Choice)
+    workers: int = 2
     out: Annotated[Path, tyro.conf.arg(metavar="DIR")] = Path("results/memory")
 
 
@@ -107,6 +109,7 @@ def planned_runs(options: MemoryStudy) -> tuple[PlannedRun, ...]:
 def _check(options: MemoryStudy) -> None:
     finite_number("seeds", options.seeds, at_least=1)
     finite_number("episodes", options.episodes, at_least=1)
+    finite_number("workers", options.workers, at_least=1)
     for name in options.agents:
         if name not in RECIPES:
             raise ValueError(unknown_name("agent", name, RECIPES))
@@ -151,7 +154,7 @@ def study_memory(options: MemoryStudy) -> tuple[GroupRow, ...]:
     if not sources:
         raise ValueError(f"no run of the plan under {options.root}; --train list gives the commands")
     out = open_folder(options.out)
-    scores = collect_scores(sources, out / "scores.csv", options.episodes, options.choice)
+    scores = collect_scores(sources, out / "scores.csv", options.episodes, options.choice, options.workers)
     reference = options.agents[0]
     rows = compare_groups(scores, reference, np.random.default_rng(0))
     sentences = conclude(rows, reference)

@@ -54,8 +54,8 @@ class AgentScore:
         return self.trained_steps < self.planned_steps
 
 
-def score_run(folder: Path, episodes: int, choice: Choice) -> AgentScore:
-    """Choose a run's actor on the tuning tiles and fly it over the validation tiles.
+def score_run(folder: Path, episodes: int, choice: Choice, workers: int) -> AgentScore:
+    """Choose a run's actor on the tuning tiles, in processes, and fly it over the validation tiles.
 
     Raises:
         ValueError: the folder holds no run, or none of its actors was validated.
@@ -70,7 +70,7 @@ def score_run(folder: Path, episodes: int, choice: Choice) -> AgentScore:
     preset, settings = find_preset(card["preset"]), settings_from_json(card["settings"])
     for split in ("tuning", "validation"):
         prepare_tiles(Ground(preset.terrain, preset.criteria), split)
-    best = best_of_run(folder, int(card["seed"]), preset, settings, choice)
+    best = best_of_run(folder, preset, settings, choice, workers)
     score = score_policy(policy_of(best.tensors, settings), preset, "validation", VALIDATION_SEED, episodes)
     return AgentScore(
         **_identity(folder, card),
@@ -144,7 +144,7 @@ def scores_of_card(path: Path) -> list[AgentScore]:
 
 
 def collect_scores(
-    sources: Sequence[Path], kept: Path, episodes: int, choice: Choice
+    sources: Sequence[Path], kept: Path, episodes: int, choice: Choice, workers: int = 1
 ) -> tuple[AgentScore, ...]:
     """Scores of runs (folders) and cards (.json); what stands in the file of kept scores is not flown again.
 
@@ -153,22 +153,21 @@ def collect_scores(
         kept: CSV of scores; what is flown is added at once, so that a stopped study goes on.
         episodes: that each run's actor flies over the validation tiles.
         choice: how the actor is chosen on the tuning tiles.
+        workers: processes that fly the candidates of a run.
 
     Raises:
         ValueError: a source is neither, or two of them are the same agent, preset and seed.
     """
-    from rich.progress import track
-
     known = {(s.source, s.settings, s.trained_steps, s.episodes): s for s in read_scores(kept)}
     scores: list[AgentScore] = []
-    for source in track(sources, "agents", transient=True):
+    for source in sources:
         if source.suffix == ".json":
             scores += scores_of_card(source)
             continue
         identity = _identity(source, read_run(source))
         key = (identity["source"], identity["settings"], identity["trained_steps"], episodes)
         if key not in known:
-            known[key] = score_run(source, episodes, choice)
+            known[key] = score_run(source, episodes, choice, workers)
             write_scores(kept, list(known.values()))
         scores.append(known[key])
     write_scores(kept, scores)

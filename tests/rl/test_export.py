@@ -13,7 +13,7 @@ from hda.episode import fly
 from hda.presets import PRESETS, sample_scenario
 from rl.algorithms import RECIPES
 from rl.artefacts import load_artefact
-from rl.candidates import Choice, average_tensors
+from rl.candidates import Choice, average_tensors, best_of_run
 from rl.export import ExportWeights, run_export
 from rl.figures import GainsFigure, TrainingFigure, draw_gains, draw_training, moving_average
 from rl.policy import AgentPolicy
@@ -52,6 +52,14 @@ def test_exported_weights_fly_and_tell_where_they_came_from(runs, tmp_path):
     assert best["seed"] == training["seed"]
     record = fly(AgentPolicy("sac", tmp_path / "weights" / "sac"), sample_scenario("paper", 8, 0, "train"))
     assert len(record.decisions) >= 1
+
+
+def test_the_choice_does_not_depend_on_the_processes(runs):
+    choice = Choice(averages=(1, 2), candidates=3, episodes=2)
+    one, two = (best_of_run(runs[0], PRESETS["paper"], SMALL, choice, workers) for workers in (1, 2))
+    assert (one.seed, one.steps, one.score) == (two.seed, two.steps, two.score)
+    for name, tensor in one.tensors.items():
+        np.testing.assert_array_equal(two.tensors[name], tensor)
 
 
 @given(arrays(np.float32, (4, 3), elements=floats(-10, 10, width=32)))
