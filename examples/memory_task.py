@@ -63,6 +63,7 @@ SETTINGS = Hyperparameters(
     update_every=2,
     discount=0.95,
     target_rate=0.02,
+    exploration_noise=0.3,
     saturation_weight=0.1,
 )
 """The modern variant, small."""
@@ -70,9 +71,7 @@ SETTINGS = Hyperparameters(
 
 def main() -> None:
     """Train it for 1400 steps."""
-    agent = RecurrentTD3(
-        Recall(), SETTINGS, seed=0, learning_rate=lambda step: 3e-3, exploration_noise=lambda step: 0.3
-    )
+    agent = RecurrentTD3(Recall(), SETTINGS, seed=0, learning_rate=lambda step: 3e-3)
     print(f"mean reward before: {mean_reward(agent):.2f}")  # noqa: T201 - an example talks
     agent.learn(1400)
     print(f"mean reward after {agent.num_timesteps} steps: {mean_reward(agent):.2f}")  # noqa: T201

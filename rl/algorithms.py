@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -34,20 +33,12 @@ class AgentSettings:
         batch_size: transitions per update.
         discount: gamma.
         target_rate: tau, of the target networks.
-        exploration_noise: standard deviation of the noise on actions (deterministic actors only), until the
-            decay begins.
-        final_noise: where the decay ends.
-        noise_decay: steps at which its linear decay begins and ends.
-        saturation_weight: of the penalty that keeps a deterministic actor off the ends of its range (td3
-            only; see `rl.td3.FastTD3`).
-        prior_weight: of the penalty that draws an actor to the nominal action where the critic sees no
-            difference (td3 only; see `rl.td3.FastTD3`).
-        control_prior_weight: of such a penalty on the gains and the clock alone (td3 and those with memory).
+        exploration_noise: standard deviation of the noise on actions (deterministic actors only).
+        smoothing_noise: standard deviation of the noise on the target actor's actions, clipped at 2.5 of it
+            (td3 and those with memory).
+        control_prior_weight: of the actor's penalty that draws the gains and the clock to their nominal
+            values (td3 and those with memory; see `rl.td3.FastTD3`).
         control_prior_step: environment step from which it holds: first free, then settled.
-        smoothing_share: the target actor's actions are smoothed by this share of the exploration noise, at
-            most 0.2; None is 0.2 throughout (td3 and those with memory; see `rl.td3.FastTD3`).
-        return_bounds: target values are clipped to them (td3 and those with memory); no landing returns more
-            than 1, and no crash from 1000 m less than -20.
         random_steps: steps with uniform actions before the first update.
         replay_size: transitions kept.
         matmul_precision: "highest" is float32; "medium" lets the processor multiply in bfloat16 where it can.
@@ -64,14 +55,9 @@ class AgentSettings:
     discount: float = 0.99
     target_rate: float = 0.005
     exploration_noise: float = 0.1
-    final_noise: float = 0.1
-    noise_decay: tuple[int, int] = (40_000, 120_000)
-    saturation_weight: float = 0.0
-    prior_weight: float = 0.0
+    smoothing_noise: float = 0.05
     control_prior_weight: float = 0.2
     control_prior_step: int = 165_000
-    smoothing_share: float | None = 0.5
-    return_bounds: tuple[float, float] | None = None
     random_steps: int = 25_000
     replay_size: int = 400_000
     matmul_precision: Literal["highest", "high", "medium"] = "medium"
@@ -84,20 +70,13 @@ class AgentSettings:
 
     def learning_rate_at(self, step: int) -> float:
         """Learning rate at an environment step."""
-        return _decayed(step, self.learning_rate, self.final_learning_rate, self.learning_rate_decay)
-
-    def noise_at(self, step: int) -> float:
-        """Standard deviation of the exploration noise at an environment step."""
-        return _decayed(step, self.exploration_noise, self.final_noise, self.noise_decay)
+        begin, end = self.learning_rate_decay
+        passed = min(1.0, max(0.0, (step - begin) / max(end - begin, 1)))
+        return self.learning_rate + passed * (self.final_learning_rate - self.learning_rate)
 
     def control_prior_at(self, step: int) -> float:
         """Weight of the penalty that draws the gains and the clock to their nominal values."""
         return self.control_prior_weight if step >= self.control_prior_step else 0.0
-
-    def smoothing_noise_at(self, step: int) -> float:
-        """Standard deviation of the noise on the target actor's actions at an environment step."""
-        share = math.inf if self.smoothing_share is None else self.smoothing_share
-        return min(0.2, share * self.noise_at(step))
 
 
 @dataclass(frozen=True)
@@ -113,18 +92,11 @@ class RecurrentSettings(AgentSettings):
 
     algorithm: AlgorithmName = "td3-lstm"
     hidden: tuple[int, ...] = (256,)
-    learning_rate: float = 1e-3
-    final_learning_rate: float = 1e-4
-    learning_rate_decay: tuple[int, int] = (50_000, 150_000)
+    learning_rate_decay: tuple[int, int] = (120_000, 160_000)
     batch_size: int = 32
-    discount: float = 0.98
-    exploration_noise: float = 0.5
-    noise_decay: tuple[int, int] = (25_000, 75_000)
-    saturation_weight: float = 0.1
-    prior_weight: float = 0.01
+    smoothing_noise: float = 0.2
     control_prior_step: int = 110_000
-    return_bounds: tuple[float, float] | None = (-20.0, 1.0)
-    random_steps: int = 10_000
+    random_steps: int = 20_000
     replay_size: int = 200_000
     memory: int = 128
     update_every: int = 1
@@ -132,37 +104,28 @@ class RecurrentSettings(AgentSettings):
     burn_in: int = 0
 
 
-def _decayed(step: int, first: float, last: float, span: tuple[int, int]) -> float:
-    """Linear from `first` to `last` over the span of steps, constant before and after."""
-    begin, end = span
-    passed = min(1.0, max(0.0, (step - begin) / max(end - begin, 1)))
-    return first + passed * (last - first)
-
-
 TD3 = AgentSettings()
+SAC = replace(
+    TD3,
+    algorithm="sac",
+    learning_rate=1e-3,
+    final_learning_rate=1e-4,
+    learning_rate_decay=(30_000, 150_000),
+    discount=0.98,
+    random_steps=5_000,
+)
 RECURRENT_RECIPES = {
     "td3-lstm": RecurrentSettings(),
     "td3-lstm-plus": RecurrentSettings(algorithm="td3-lstm-plus"),
 }
 RECIPES: dict[str, AgentSettings] = {
     "td3": TD3,
-    "sac": replace(TD3, algorithm="sac", random_steps=5_000, learning_rate_decay=(30_000, 150_000)),
+    "sac": SAC,
     "ddpg": replace(TD3, algorithm="ddpg"),
-    "tqc": replace(TD3, algorithm="tqc", random_steps=5_000, learning_rate_decay=(30_000, 150_000)),
+    "tqc": replace(SAC, algorithm="tqc"),
     **RECURRENT_RECIPES,
-    "td3-paper": AgentSettings(
-        layout=PRINTED.name,
-        learning_rate=3e-4,
-        final_learning_rate=3e-4,
-        discount=0.99,
-        exploration_noise=0.1,
-        final_noise=0.1,
-        saturation_weight=0.0,
-        prior_weight=0.0,
-        control_prior_weight=0.0,
-        smoothing_share=None,
-        return_bounds=None,
-        random_steps=25_000,
+    "td3-paper": replace(
+        TD3, layout=PRINTED.name, final_learning_rate=3e-4, smoothing_noise=0.2, control_prior_weight=0.0
     ),
 }
 """`td3-paper` is the vector that the paper prints with the settings that TD3's authors published, since the
@@ -175,13 +138,12 @@ def make_agent_with_memory(settings: RecurrentSettings, env: Any, seed: int) -> 
     from rl.td3_lstm import RecurrentTD3
 
     names = ("memory", "batch_size", "discount", "target_rate", "random_steps", "update_every")
-    names += ("replay_size", "window", "burn_in", "saturation_weight", "prior_weight", "return_bounds")
+    names += ("replay_size", "window", "burn_in", "exploration_noise", "smoothing_noise")
     chosen = {name: getattr(settings, name) for name in names}
     hyperparameters = Hyperparameters(
         plus=settings.algorithm == "td3-lstm-plus", head=settings.hidden, **chosen
     )
-    schedules = (settings.learning_rate_at, settings.noise_at, settings.smoothing_noise_at)
-    agent = RecurrentTD3(env, hyperparameters, seed, *schedules)
+    agent = RecurrentTD3(env, hyperparameters, seed, settings.learning_rate_at)
     controls = (np.arange(agent.sizes.action) < CONTROLS).astype(np.float32)
     agent.action_prior = lambda step: settings.control_prior_at(step) * controls
     return agent
@@ -202,8 +164,9 @@ def make_algorithm(settings: AgentSettings, env: Any, seed: int) -> OffPolicyAlg
     if isinstance(settings, RecurrentSettings):
         return make_agent_with_memory(settings, env, seed)
     from stable_baselines3 import DDPG, SAC
+    from stable_baselines3.common.noise import NormalActionNoise
 
-    from rl.td3 import FastTD3, ScheduledNoise
+    from rl.td3 import FastTD3
 
     classes: dict[str, Any] = {"td3": FastTD3, "ddpg": DDPG, "sac": SAC}
     if settings.algorithm == "tqc":
@@ -230,11 +193,9 @@ def make_algorithm(settings: AgentSettings, env: Any, seed: int) -> OffPolicyAlg
     # decays follow the step and not SB3's share of the total, so that a longer run begins as a shorter one
     algorithm.lr_schedule = lambda _: settings.learning_rate_at(algorithm.num_timesteps)
     if isinstance(algorithm, FastTD3):
-        algorithm.saturation_weight = settings.saturation_weight
-        algorithm.prior_weight = settings.prior_weight
         algorithm.control_prior = lambda: settings.control_prior_at(algorithm.num_timesteps)
-        algorithm.smoothing_noise = lambda: settings.smoothing_noise_at(algorithm.num_timesteps)
-        algorithm.return_bounds = settings.return_bounds
+        algorithm.target_policy_noise = settings.smoothing_noise
+        algorithm.target_noise_clip = 2.5 * settings.smoothing_noise
     if settings.algorithm in ("td3", "ddpg"):
-        algorithm.action_noise = ScheduledNoise(lambda: settings.noise_at(algorithm.num_timesteps))
+        algorithm.action_noise = NormalActionNoise(np.zeros(5), np.full(5, settings.exploration_noise))
     return algorithm

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,7 +14,6 @@ from rl.recurrent_losses import ActorCritic
 from rl.recurrent_networks import NetworkSizes
 
 Array = NDArray[np.float32]
-Schedule = Callable[[int], float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,19 +49,17 @@ class RecurrentAgent:
         settings: hyperparameters.
         sizes: of the networks.
         networks: all four; also by name, as a checkpoint keeps them.
-        exploration_noise: standard deviation of the noise on actions, at an environment step.
         rng: draws the exploration, and whatever a learner draws.
         num_timesteps: environment steps so far.
     """
 
-    def __init__(self, env: Any, settings: Hyperparameters, seed: int, exploration_noise: Schedule) -> None:
+    def __init__(self, env: Any, settings: Hyperparameters, seed: int) -> None:
         """Make it untrained.
 
         Args:
             env: Gymnasium environment with one-dimensional boxes for observations and actions.
             settings: hyperparameters.
             seed: of weights and exploration.
-            exploration_noise: standard deviation on actions in [-1, 1], by environment step.
 
         Raises:
             ValueError: the spaces are not boxes of one dimension.
@@ -71,7 +67,7 @@ class RecurrentAgent:
         for name in ("observation_space", "action_space"):
             if len(getattr(getattr(env, name), "shape", None) or ()) != 1:
                 raise ValueError(f"env must have a one-dimensional Box as {name}, got {getattr(env, name)}")
-        self.settings, self.exploration_noise = settings, exploration_noise
+        self.settings = settings
         self.observation_space, self.action_space = env.observation_space, env.action_space
         self.sizes = NetworkSizes(
             env.observation_space.shape[0],
@@ -120,7 +116,7 @@ class RecurrentAgent:
             last_reward *= keep
         action, hidden, cell = self._act(seen, memory, last_reward)
         if not deterministic:
-            noise = self.rng.normal(0.0, self.exploration_noise(self.num_timesteps), action.shape)
+            noise = self.rng.normal(0.0, self.settings.exploration_noise, action.shape)
             action = np.clip(action + noise, -1.0, 1.0).astype(np.float32)
         after = AgentMemory(hidden, cell, action)
         own = self._unscaled(action)

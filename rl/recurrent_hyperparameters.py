@@ -16,7 +16,8 @@ class Hyperparameters:
         batch_size: sequences per update.
         discount: gamma.
         target_rate: tau.
-        return_bounds: least and greatest return that an episode can have; target values are clipped to them.
+        exploration_noise: standard deviation of the noise on actions in [-1, 1].
+        smoothing_noise: standard deviation of the noise on the target actor's actions, clipped at 2.5 of it.
         policy_delay: updates of the critics for one of the actor and the targets.
         random_steps: steps with uniform actions before the first update.
         update_every: environment steps for one update.
@@ -25,7 +26,6 @@ class Hyperparameters:
         burn_in: transitions before a window that only fill the memory.
         saturation_weight: of the penalty for inputs of the actor's tanh beyond `saturation_bound`.
         saturation_bound: 1.5 lets actions reach 0.905 without a penalty.
-        prior_weight: of the penalty for the squares of those inputs.
     """
 
     plus: bool = False
@@ -34,7 +34,8 @@ class Hyperparameters:
     batch_size: int = 100
     discount: float = 0.99
     target_rate: float = 0.005
-    return_bounds: tuple[float, float] | None = None
+    exploration_noise: float = 0.1
+    smoothing_noise: float = 0.2
     policy_delay: int = 2
     random_steps: int = 1_000
     update_every: int = 1
@@ -43,4 +44,3 @@ class Hyperparameters:
     burn_in: int = 0
     saturation_weight: float = 0.0
     saturation_bound: float = 1.5
-    prior_weight: float = 0.0

@@ -102,8 +102,6 @@ def target_values(
         actions = (torch.tanh(inputs[1:]) + noise).clamp_(-1.0, 1.0)
         pasts = [past[1:] for past in networks.critic_target.remember(batch.history)]
         value = torch.minimum(*networks.critic_target.values(pasts, batch.observations[1:], actions))
-        if settings.return_bounds is not None:
-            value.clamp_(*settings.return_bounds)
         return batch.rewards + (1.0 - batch.terminated) * settings.discount * value
 
 
@@ -116,7 +114,7 @@ def critic_loss(
         networks: learning and target networks.
         batch: T transitions of N sequences.
         noise: of target smoothing, shape (T, N, a).
-        settings: discount and bounds of the return.
+        settings: discount.
     """
     target = target_values(networks, batch, noise, settings)
     pasts = networks.critic.remember(batch.history[:-1])
@@ -134,8 +132,8 @@ def actor_loss(
     Args:
         networks: learning and target networks.
         batch: T transitions of N sequences.
-        settings: weights of the penalties.
-        prior: (a,), weights of one more penalty for the squares of the inputs of the actor's tanh, by
+        settings: of the penalty for saturation.
+        prior: (a,), weights of a penalty for the squares of the inputs of the actor's tanh, by
             element; None for none.
     """
     inputs, _ = networks.actor(batch.observations[:-1], batch.history[:-1])
@@ -146,8 +144,6 @@ def actor_loss(
     if settings.saturation_weight > 0.0:
         excess = (inputs.abs() - settings.saturation_bound).clamp_min(0.0)
         loss = loss + settings.saturation_weight * batch.mean(excess.square().sum(-1))
-    if settings.prior_weight > 0.0:
-        loss = loss + settings.prior_weight * batch.mean(inputs.square().sum(-1))
     if prior is not None:
         loss = loss + batch.mean((prior * inputs.square()).sum(-1))
     return loss

@@ -22,9 +22,9 @@ Deviations of the printed variant from Algorithm 3 as printed:
 6. The critics' targets use each critic's own history network; the action in front of the first observation is
    zero and not random, since there is none.
 7. The loss as printed trains both critics through one Q; here each has its own error.
-8. The first `random_steps` have uniform actions; exploration noise, target smoothing and learning rate may
-   decay; values may be clipped to what a return can be; and penalties (0 switches them off) keep the actor
-   off the ends of its range and near 0. See `Hyperparameters` and `RecurrentTD3.action_prior`.
+8. The first `random_steps` have uniform actions; the learning rate may decay; and penalties (0 switches
+   them off) keep the actor off the ends of its range and near 0. See `Hyperparameters` and
+   `RecurrentTD3.action_prior`.
 9. Truncated episodes keep the value of their last observation; d = 1 only where the task itself ended.
 """
 
@@ -38,12 +38,13 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from rl.recurrent_agent import AgentMemory, RecurrentAgent, Schedule
+from rl.recurrent_agent import AgentMemory, RecurrentAgent
 from rl.recurrent_hyperparameters import Hyperparameters
 from rl.recurrent_losses import SequenceTensors, actor_loss, critic_loss
 from rl.replay import Episode, EpisodeReplay, SequenceBatch
 
 Array = NDArray[np.float32]
+Schedule = Callable[[int], float]
 
 
 class RecurrentTD3(RecurrentAgent):
@@ -52,9 +53,8 @@ class RecurrentTD3(RecurrentAgent):
     Attributes:
         env: what it learns from.
         learning_rate: of Adam, at an environment step.
-        smoothing_noise: standard deviation of the noise on the target actor's actions, at one.
-        action_prior: weights, shape (a,), of one more penalty that draws each element of the actor's action
-            to 0, at one; None for none.
+        action_prior: weights, shape (a,), of a penalty that draws each element of the actor's action to 0, at
+            one; None for none.
         logger: with `record(name, value)`; None for none.
     """
 
@@ -64,8 +64,6 @@ class RecurrentTD3(RecurrentAgent):
         settings: Hyperparameters,
         seed: int,
         learning_rate: Schedule = lambda step: 1e-3,
-        exploration_noise: Schedule = lambda step: 0.1,
-        smoothing_noise: Schedule = lambda step: 0.2,
     ) -> None:
         """Make it untrained.
 
@@ -74,16 +72,13 @@ class RecurrentTD3(RecurrentAgent):
             settings: hyperparameters.
             seed: of weights, exploration, sampling and the environment's first reset.
             learning_rate: of Adam, by environment step.
-            exploration_noise: standard deviation on actions in [-1, 1], by environment step.
-            smoothing_noise: standard deviation on the target actor's actions, clipped at 2.5 of it, by
-                environment step.
 
         Raises:
             ValueError: the spaces are not boxes of one dimension.
         """
-        super().__init__(env, settings, seed, exploration_noise)
+        super().__init__(env, settings, seed)
         self.env, self.seed = env, seed
-        self.learning_rate, self.smoothing_noise = learning_rate, smoothing_noise
+        self.learning_rate = learning_rate
         self.action_prior: Callable[[int], Array] | None = None
         rate = learning_rate(0)
         self.actor_optimizer = torch.optim.Adam(self.actor.parameters(), lr=rate, fused=True)
@@ -213,7 +208,7 @@ class RecurrentTD3(RecurrentAgent):
 
     def _smoothing_noise(self, shape: torch.Size) -> Tensor:
         noise = self.rng.standard_normal(tuple(shape), dtype=np.float32).clip(-2.5, 2.5)
-        return torch.from_numpy(noise * np.float32(self.smoothing_noise(self.num_timesteps)))
+        return torch.from_numpy(noise * np.float32(self.settings.smoothing_noise))
 
     def _update_actor(self, batch: SequenceTensors) -> float:
         self.critic.requires_grad_(False)

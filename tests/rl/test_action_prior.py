@@ -48,7 +48,7 @@ def test_the_penalty_is_the_weighted_mean_square_over_what_counts(agent):
 def test_a_heavy_prior_brings_the_gains_to_nominal_and_leaves_the_target_free(agent):
     agent.action_prior = lambda step: np.array([50.0, 50.0, 50.0, 0.0, 0.0], np.float32)
     agent.num_timesteps = RECIPE.random_steps
-    agent.train(300)
+    agent.train(600)
     batch = SequenceTensors.of(agent.sample(), True)
     inputs, _ = agent.actor(batch.observations[:-1], batch.history[:-1])
     actions = torch.tanh(inputs)[batch.counted.bool()].abs().mean(0)

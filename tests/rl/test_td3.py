@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import torch
 
+from rl.action import CONTROLS
 from rl.algorithms import RECIPES, AgentSettings, make_algorithm
 from rl.env import LunarHDAEnv
 from rl.td3 import FastTD3
@@ -34,21 +35,17 @@ def test_published_td3_leaves_a_saturated_actor_where_the_critic_is_flat():
     assert float(inputs_of_tanh(flat_critic(5.0), 20).min()) > 4.0
 
 
-def test_the_guard_brings_a_saturated_actor_to_its_bound_and_no_further():
-    model = flat_critic(5.0)
-    model.saturation_weight = 0.1
-    assert float(inputs_of_tanh(model, 600).abs().max()) == pytest.approx(1.5, abs=0.02)
-
-
-def test_the_prior_brings_a_free_actor_to_the_nominal_action():
+def test_the_prior_brings_gains_and_clock_to_nominal_and_leaves_the_target():
     model = flat_critic(1.0)
-    model.prior_weight = 0.01
-    assert float(inputs_of_tanh(model, 600).abs().max()) < 0.05
+    model.control_prior = lambda: 0.01
+    inputs = inputs_of_tanh(model, 600).abs()
+    assert float(inputs[:, :CONTROLS].max()) < 0.05
+    assert float(inputs[:, CONTROLS:].min()) > 0.5
 
 
 def test_the_critic_learns_while_the_actor_does_not_touch_it():
     model = flat_critic(0.0)
-    model.prior_weight = 1.0
+    model.control_prior = lambda: 1.0
     before = [parameter.clone() for parameter in model.critic.parameters()]
     inputs_of_tanh(model, 3)
     for old, new in zip(before, model.critic.parameters(), strict=True):
@@ -56,36 +53,35 @@ def test_the_critic_learns_while_the_actor_does_not_touch_it():
         assert new.requires_grad
 
 
-def test_decays_are_linear_between_their_ends():
-    settings = AgentSettings(
-        exploration_noise=0.5,
-        final_noise=0.1,
-        noise_decay=(100, 300),
-        learning_rate=1.0,
-        final_learning_rate=0.0,
+def test_the_learning_rate_decays_linearly_between_its_ends_and_the_prior_sets_in():
+    settings = AgentSettings(learning_rate=1.0, final_learning_rate=0.0, learning_rate_decay=(100, 300))
+    assert [settings.learning_rate_at(step) for step in (0, 100, 200, 300, 9999)] == pytest.approx(
+        [1.0, 1.0, 0.5, 0.0, 0.0]
     )
-    assert [settings.noise_at(step) for step in (0, 100, 200, 300, 9999)] == pytest.approx(
-        [0.5, 0.5, 0.3, 0.1, 0.1]
-    )
-    begin, end = settings.learning_rate_decay
-    assert settings.learning_rate_at((begin + end) // 2) == pytest.approx(0.5)
+    step = settings.control_prior_step
+    assert [settings.control_prior_at(k) for k in (0, step - 1, step)] == [
+        0,
+        0,
+        settings.control_prior_weight,
+    ]
 
 
-def test_noise_and_learning_rate_follow_the_step():
-    env = LunarHDAEnv()
-    model = make_algorithm(RECIPES["td3"], env, seed=0)
+def test_the_algorithm_follows_its_settings():
+    model = make_algorithm(RECIPES["td3"], LunarHDAEnv(), seed=0)
     assert isinstance(model, FastTD3)
-    for step, deviation in ((0, 0.5), (10**6, 0.1)):
+    assert model.action_noise is not None
+    draws = np.array([model.action_noise() for _ in range(4000)])
+    assert draws.std() == pytest.approx(RECIPES["td3"].exploration_noise, rel=0.05)
+    assert model.target_policy_noise == RECIPES["td3"].smoothing_noise
+    for step, rate in ((0, 3e-4), (10**6, 3e-5)):
         model.num_timesteps = step
-        assert model.action_noise is not None
-        draws = np.array([model.action_noise() for _ in range(4000)])
-        assert draws.std() == pytest.approx(deviation, rel=0.05)
-        assert model.lr_schedule(0.5) == pytest.approx(1e-3 if step == 0 else 1e-4)
+        assert model.lr_schedule(0.5) == pytest.approx(rate)
 
 
 def test_the_papers_recipe_is_td3_as_published():
     recipe = RECIPES["td3-paper"]
-    assert (recipe.layout, recipe.saturation_weight, recipe.prior_weight) == ("printed", 0.0, 0.0)
+    assert recipe.layout == "printed"
+    assert (recipe.exploration_noise, recipe.smoothing_noise, recipe.discount) == (0.1, 0.2, 0.99)
     for step in (0, 100_000, 10**6):
-        assert recipe.noise_at(step) == 0.1
+        assert recipe.control_prior_at(step) == 0.0
         assert recipe.learning_rate_at(step) == 3e-4

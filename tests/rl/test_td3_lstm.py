@@ -62,7 +62,7 @@ def mean_recall(agent) -> float:
 
 @pytest.mark.parametrize("plus", [False, True])
 def test_memory_solves_a_task_that_needs_it(plus):
-    agent = RecurrentTD3(WideRecall(), replace(SETTINGS, plus=plus), 0, lambda step: 3e-3, lambda step: 0.3)
+    agent = RecurrentTD3(WideRecall(), replace(SETTINGS, plus=plus), 0, lambda step: 3e-3)
     agent.learn(1400)
     assert mean_recall(agent) > 0.8
 
@@ -170,7 +170,7 @@ def test_targets_stop_at_the_end_and_discount_before():
         action = torch.tanh(agent.actor(batch.observations, batch.history)[0][1:])
         pasts = [past[1:] for past in agent.critic.remember(batch.history)]
         following = torch.minimum(*agent.critic.values(pasts, batch.observations[1:], action))
-        target = batch.rewards + 0.98 * following
+        target = batch.rewards + agent.settings.discount * following
         cut = sum((value - target).square().item() for value in values)
         assert critic_loss(agent.networks, batch, noise, agent.settings).item() == pytest.approx(
             cut, rel=1e-5
