@@ -24,7 +24,8 @@ from hda.scenario import Preset
 from studies.command_line import choose_policies, open_folder, resumable
 from studies.contract import check_contract
 from studies.executor import OpenExecutor, local_processes
-from studies.monte_carlo import Study, chunk_bounds, fly_chunks, prepare_study
+from studies.missing_chunks import find_missing, fly_missing
+from studies.monte_carlo import Study, prepare_study
 from studies.paired import compare_pairs, write_paired
 from studies.provenance import describe_study, write_provenance
 from studies.report import ReportContent, fly_report_flights, write_report
@@ -157,26 +158,15 @@ def with_reference(study: Study) -> Study:
 
 def fly_with_progress(folder: StudyFolder, options: Comparison) -> None:
     """Fly what a folder's study still lacks, under a progress bar; every chunk goes to the folder at once."""
-    study, workers = folder.study, options.workers
+    study = folder.study
     open_executor, here = choose_executor(options)
-    finished, damages = folder.find_finished()
-    for damage in damages:
-        Console(stderr=True).print(f"flown again: {damage}", style="yellow", markup=False, highlight=False)
-    missing = [bounds for bounds in chunk_bounds(study) if bounds not in finished]
+    missing = find_missing(folder)
     if missing and here:  # the workers of a cluster build the tiles that they meet
-        prepare_study(study, workers)
+        prepare_study(study, options.workers)
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, transient=True) as progress:
-        each = len(study.policies)
-        done = sum(last - first for first, last in finished) * each
-        task = progress.add_task("episodes", total=study.episodes * each, completed=done)
-        for chunk in fly_chunks(study, missing, open_executor, workers=workers):
-            folder.store(chunk)
-            progress.advance(task, (chunk.last - chunk.first) * each)
-            if chunk.attempts > 1:
-                progress.console.print(
-                    f"a worker died: episodes {chunk.first} to {chunk.last - 1} were flown again"
-                )
+        task = progress.add_task("episodes", total=study.episodes * len(study.policies))
+        fly_missing(folder, missing, open_executor, options.workers, (progress, task))
 
 
 def summarize_study(study: Study, scores: StudyScores) -> list[PolicySummary]:

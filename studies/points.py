@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from studies.executor import local_processes
-from studies.monte_carlo import Study, StudyResult, chunk_bounds, fly_chunks, join_chunks, prepare_study
+from studies.missing_chunks import find_missing, fly_missing
+from studies.monte_carlo import Study, StudyResult, join_chunks, prepare_study
 from studies.rows import EpisodeRow
 from studies.study_folder import Existing, open_study_folder
 
@@ -65,14 +65,7 @@ def fly_points(out: Path, points: Sequence[Point], existing: Existing, workers: 
 
 
 def _fly_point(path: Path, study: Study, existing: Existing, workers: int, progress: Progress) -> StudyResult:
-    task = progress.task_ids[0]
     with open_study_folder(path, study, existing) as folder:
-        finished, damages = folder.find_finished()
-        for damage in damages:
-            Console(stderr=True).print(f"flown again: {damage}", style="yellow", markup=False)
-        progress.advance(task, sum(last - first for first, last in finished) * len(study.policies))
-        missing = [bounds for bounds in chunk_bounds(study) if bounds not in finished]
-        for chunk in fly_chunks(study, missing, partial(local_processes, workers), workers=workers):
-            folder.store(chunk)
-            progress.advance(task, (chunk.last - chunk.first) * len(study.policies))
+        bar = (progress, progress.task_ids[0])
+        fly_missing(folder, find_missing(folder), partial(local_processes, workers), workers, bar)
         return join_chunks(study, folder.read_chunks())
