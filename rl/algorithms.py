@@ -104,9 +104,9 @@ class RecurrentSettings(AgentSettings):
     burn_in: int = 0
 
 
-TD3 = AgentSettings()
-SAC = replace(
-    TD3,
+TD3_SETTINGS = AgentSettings()
+SAC_SETTINGS = replace(
+    TD3_SETTINGS,
     algorithm="sac",
     learning_rate=1e-3,
     final_learning_rate=1e-4,
@@ -119,13 +119,17 @@ RECURRENT_RECIPES = {
     "td3-lstm-plus": RecurrentSettings(algorithm="td3-lstm-plus"),
 }
 RECIPES: dict[str, AgentSettings] = {
-    "td3": TD3,
-    "sac": SAC,
-    "ddpg": replace(TD3, algorithm="ddpg"),
-    "tqc": replace(SAC, algorithm="tqc"),
+    "td3": TD3_SETTINGS,
+    "sac": SAC_SETTINGS,
+    "ddpg": replace(TD3_SETTINGS, algorithm="ddpg"),
+    "tqc": replace(SAC_SETTINGS, algorithm="tqc"),
     **RECURRENT_RECIPES,
     "td3-paper": replace(
-        TD3, layout=PRINTED.name, final_learning_rate=3e-4, smoothing_noise=0.2, control_prior_weight=0.0
+        TD3_SETTINGS,
+        layout=PRINTED.name,
+        final_learning_rate=3e-4,
+        smoothing_noise=0.2,
+        control_prior_weight=0.0,
     ),
 }
 """`td3-paper` is the vector that the paper prints with the settings that TD3's authors published, since the

@@ -1,4 +1,4 @@
-"""The penalty of agents with memory that draws single elements of the action to 0."""
+"""The penalties of agents with memory: towards 0 by element of the action, and off the ends of its range."""
 
 from dataclasses import replace
 
@@ -12,7 +12,7 @@ from rl.env import LunarHDAEnv
 from rl.recurrent_losses import SequenceTensors, actor_loss
 from rl.replay import Episode
 
-RECIPE = replace(RECURRENT_RECIPES["td3-lstm-plus"], memory=8, hidden=(16,), batch_size=4)
+RECIPE = replace(RECURRENT_RECIPES["td3-lstm-plus"], memory=8, hidden=(16,), batch_size=4, learning_rate=1e-3)
 
 
 @pytest.fixture
@@ -45,10 +45,23 @@ def test_the_penalty_is_the_weighted_mean_square_over_what_counts(agent):
     assert (more - less).item() == pytest.approx(expected.item(), rel=1e-3)
 
 
+def test_the_guard_against_saturation_counts_only_what_lies_beyond_its_bound(agent):
+    batch = SequenceTensors.of(agent.sample(), True)
+    inputs, _ = agent.actor(batch.observations[:-1], batch.history[:-1])
+    rows = inputs[batch.counted.bool()].detach().double().abs()
+    bound = float(rows.median())
+    guarded = replace(agent.settings, saturation_weight=2.0, saturation_bound=bound)
+    more = actor_loss(agent.networks, batch, guarded)
+    less = actor_loss(agent.networks, batch, agent.settings)
+    expected = 2.0 * (rows - bound).clamp_min(0.0).square().sum(-1).mean()
+    assert expected.item() > 0.0
+    assert (more - less).item() == pytest.approx(expected.item(), rel=1e-2)
+
+
 def test_a_heavy_prior_brings_the_gains_to_nominal_and_leaves_the_target_free(agent):
     agent.action_prior = lambda step: np.array([50.0, 50.0, 50.0, 0.0, 0.0], np.float32)
     agent.num_timesteps = RECIPE.random_steps
-    agent.train(600)
+    agent.train(300)
     batch = SequenceTensors.of(agent.sample(), True)
     inputs, _ = agent.actor(batch.observations[:-1], batch.history[:-1])
     actions = torch.tanh(inputs)[batch.counted.bool()].abs().mean(0)
