@@ -136,6 +136,12 @@ RECIPES: dict[str, AgentSettings] = {
 paper gives none; the others start from what measurement found."""
 
 
+def settings_from_json(values: dict[str, Any]) -> AgentSettings:
+    """Undo `dataclasses.asdict` and JSON on AgentSettings."""
+    kind = RecurrentSettings if values.get("algorithm") in WITH_MEMORY else AgentSettings
+    return kind(**{**values, **{k: tuple(v) for k, v in values.items() if isinstance(v, list)}})
+
+
 def make_agent_with_memory(settings: RecurrentSettings, env: Any, seed: int) -> RecurrentTD3:
     """Make an untrained agent with memory."""
     from rl.recurrent_hyperparameters import Hyperparameters

@@ -109,9 +109,7 @@ def _score_all(flights: Sequence[_Flights], workers: int, task: str) -> list[Sco
             return [future.result() for future in futures]
 
 
-def best_of_run(
-    run: Path, preset: Preset, settings: AgentSettings, choice: Choice, workers: int
-) -> Candidate:
+def best_of_run(run: Path, choice: Choice, workers: int) -> Candidate:
     """The best weights of one run.
 
     All windows of successive actors fly the episodes of the periodic validation; the best fly more episodes,
@@ -119,18 +117,20 @@ def best_of_run(
 
     Args:
         run: folder of the run.
-        preset: that it was trained on.
-        settings: that it was trained with.
         choice: how candidates are judged.
         workers: processes; the choice does not depend on them.
 
     Raises:
-        ValueError: the run has no validated actor.
+        ValueError: the folder holds no run, or the run has no validated actor.
     """
+    from hda.presets import find_preset
+    from rl.algorithms import settings_from_json
     from rl.artefacts import load_artefact
     from rl.run_folder import read_rows, read_run
     from rl.training_recorder import TUNING_SEED
 
+    card = read_run(run)
+    preset, settings = find_preset(card["preset"]), settings_from_json(card["settings"])
     rows = [row for row in read_rows(run / "validation.csv") if int(row["updates"]) > 0]
     if not rows:
         raise ValueError(f"{run} has no validated actor")
@@ -158,5 +158,4 @@ def best_of_run(
     again = [flights(window, CHOICE_SEED, choice.episodes) for window in best]
     scores = _score_all(again, workers, f"{run}: the best of them")
     chosen, score = max(zip(best, scores, strict=True), key=lambda pair: pair[1].rank)
-    seed = int(read_run(run)["seed"])
-    return Candidate(run, seed, tuple(steps[chosen]), average_tensors(actors[chosen]), score)
+    return Candidate(run, int(card["seed"]), tuple(steps[chosen]), average_tensors(actors[chosen]), score)

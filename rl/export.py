@@ -38,14 +38,6 @@ class ExportWeights:
     out: Annotated[Path, tyro.conf.arg(metavar="DIR")] = field(default=WEIGHTS_FOLDER)
 
 
-def settings_from_json(values: dict[str, Any]) -> AgentSettings:
-    """Undo `dataclasses.asdict` and JSON on AgentSettings."""
-    from rl.algorithms import WITH_MEMORY, AgentSettings, RecurrentSettings
-
-    kind = RecurrentSettings if values.get("algorithm") in WITH_MEMORY else AgentSettings
-    return kind(**{**values, **{k: tuple(v) for k, v in values.items() if isinstance(v, list)}})
-
-
 def training_command(card: dict[str, Any], seed: int) -> str:
     """The command that trains a run as its card says: settings that differ from the recipe's become flags."""
     from rl.algorithms import RECIPES
@@ -89,6 +81,7 @@ def run_export(options: ExportWeights) -> None:
     from hda.dtm_library import Ground, prepare_tiles
     from hda.presets import find_preset
     from rl.actor_export import actor_card
+    from rl.algorithms import settings_from_json
     from rl.artefacts import library_versions, save_artefact
     from rl.run_folder import read_rows, read_run
     from rl.training_recorder import TUNING_SEED
@@ -104,7 +97,7 @@ def run_export(options: ExportWeights) -> None:
         prepare_tiles(Ground(preset.terrain, preset.criteria), split)
     best = []
     for run in options.runs:
-        best.append(best_of_run(run, preset, settings, options.choice, options.workers))
+        best.append(best_of_run(run, options.choice, options.workers))
         console.print(f"{run}: steps {best[-1].steps}, {best[-1].score.as_dict()}")
     chosen = max(best, key=lambda candidate: candidate.score.rank)
     seeds = [validate(candidate, preset, settings, options) for candidate in best]

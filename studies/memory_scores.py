@@ -63,14 +63,14 @@ def score_run(folder: Path, episodes: int, choice: Choice, workers: int) -> Agen
     from hda.dtm_library import Ground, prepare_tiles
     from hda.presets import find_preset
     from rl.actor_export import policy_of
-    from rl.export import settings_from_json
+    from rl.algorithms import settings_from_json
     from rl.scoring import score_policy
 
     card = read_run(folder)
     preset, settings = find_preset(card["preset"]), settings_from_json(card["settings"])
     for split in ("tuning", "validation"):
         prepare_tiles(Ground(preset.terrain, preset.criteria), split)
-    best = best_of_run(folder, preset, settings, choice, workers)
+    best = best_of_run(folder, choice, workers)
     score = score_policy(policy_of(best.tensors, settings), preset, "validation", VALIDATION_SEED, episodes)
     return AgentScore(
         **_identity(folder, card),

@@ -56,7 +56,7 @@ def test_exported_weights_fly_and_tell_where_they_came_from(runs, tmp_path):
 
 def test_the_choice_does_not_depend_on_the_processes(runs):
     choice = Choice(averages=(1, 2), candidates=3, episodes=2)
-    one, two = (best_of_run(runs[0], PRESETS["paper"], SMALL, choice, workers) for workers in (1, 2))
+    one, two = (best_of_run(runs[0], choice, workers) for workers in (1, 2))
     assert (one.seed, one.steps, one.score) == (two.seed, two.steps, two.score)
     for name, tensor in one.tensors.items():
         np.testing.assert_array_equal(two.tensors[name], tensor)
