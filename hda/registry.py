@@ -33,6 +33,7 @@ class PolicyEntry:
         summary: what it does, in one line.
         privileged: it sees the true map; every table marks it.
         slow: a decision takes more than about 50 ms; flown only when asked for.
+        preset: setting that it was made for, flown on others only when asked for; None: made for all.
     """
 
     name: str
@@ -40,6 +41,11 @@ class PolicyEntry:
     summary: str
     privileged: bool = False
     slow: bool = False
+    preset: str | None = None
+
+    def belongs_on(self, preset: str) -> bool:
+        """Whether tables of a setting hold it without being asked."""
+        return not self.slow and self.preset in (None, preset)
 
 
 _entries: dict[str, PolicyEntry] = {}

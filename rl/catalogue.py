@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from hda.policies.adjusted_descent import AdjustedDescent
 from hda.policies.composition import ComposedPolicy
 from hda.policies.zem_zev import FixedGainZemZev
 from hda.registry import PolicyEntry
-from rl.policy import AgentPolicy, AgentSite, shipped
+from rl.algorithms import WITH_MEMORY
+from rl.policy import AgentPolicy, AgentSite, shipped, weights_name
 from rl.recurrent_policy import RecurrentAgentPolicy
 
 _AGENTS = {
@@ -18,12 +21,20 @@ _AGENTS = {
 }
 
 
-def _agent(name: str) -> PolicyEntry:
-    return PolicyEntry(name, lambda: AgentPolicy(name, shipped(name)), _AGENTS[name])
+def _agent(agent: str) -> PolicyEntry:
+    """An agent trained on `paper`."""
+    return PolicyEntry(agent, _maker(agent, agent), _AGENTS[agent])
 
 
-def _agent_with_memory(name: str) -> PolicyEntry:
-    return PolicyEntry(name, lambda: RecurrentAgentPolicy(name, shipped(name)), _AGENTS[name])
+def _agent_of(preset: str, agent: str) -> PolicyEntry:
+    """An agent trained on another preset."""
+    name = weights_name(agent, preset)
+    return PolicyEntry(name, _maker(name, agent), f"{_AGENTS[agent]}; trained on {preset}", preset=preset)
+
+
+def _maker(name: str, agent: str) -> Callable[[], AgentPolicy | RecurrentAgentPolicy]:
+    kind = RecurrentAgentPolicy if agent in WITH_MEMORY else AgentPolicy
+    return lambda: kind(name, shipped(name))
 
 
 _ENTRIES = (
@@ -45,9 +56,13 @@ _ENTRIES = (
         ),
     ),
     ("sac", _agent("sac")),
-    ("td3-lstm", _agent_with_memory("td3-lstm")),
-    ("td3-lstm-plus", _agent_with_memory("td3-lstm-plus")),
+    ("td3-lstm", _agent("td3-lstm")),
+    ("td3-lstm-plus", _agent("td3-lstm-plus")),
     ("td3-paper", _agent("td3-paper")),
+    *(
+        (weights_name(agent, "partial"), _agent_of("partial", agent))
+        for agent in ("td3", "td3-lstm", "td3-lstm-plus")
+    ),
 )
 
 

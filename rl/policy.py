@@ -171,6 +171,11 @@ class AgentSite:
         return load_actor(self.weights).decide(observation, memory).site, memory
 
 
+def weights_name(agent: str, preset: str) -> str:
+    """Name of shipped weights; those that were trained on `paper` go by the agent's own."""
+    return agent if preset == "paper" else f"{agent}-{preset}"
+
+
 def shipped(name: str) -> Path:
     """Path of shipped weights, without suffix."""
     return WEIGHTS_FOLDER / name

@@ -33,10 +33,12 @@ def resumable() -> Iterator[None]:
         sys.exit(130)
 
 
-def choose_policies(wanted: Sequence[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+def choose_policies(wanted: Sequence[str], preset: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Names in the order of the registry, each once, and the paths among what was asked for.
 
-    `default` and `all` stand for several names; a path `package.module:Name` is loaded and gives a name.
+    Args:
+        wanted: names, paths `package.module:Name`, which are loaded and give a name, `default` or `all`.
+        preset: setting that they fly on; `default` stands for those that belong there.
 
     Raises:
         ValueError: a name is unknown, a path leads to no policy, or none was given.
@@ -45,7 +47,7 @@ def choose_policies(wanted: Sequence[str]) -> tuple[tuple[str, ...], tuple[str, 
         raise ValueError("policies must name at least one policy")
     groups = {
         "all": policy_names(),
-        "default": tuple(name for name in policy_names() if not policy_entry(name).slow),
+        "default": tuple(name for name in policy_names() if policy_entry(name).belongs_on(preset)),
     }
     chosen = {name for entry in wanted for name in groups.get(entry) or (policy_entry(entry).name,)}
     paths = tuple(dict.fromkeys(entry for entry in wanted if ":" in entry))

@@ -49,9 +49,10 @@ class Comparison:
 
     Attributes:
         episodes: episodes per policy, at least 1.
-        policies: names of policies; `default` is every one that is not slow, `all` is every one;
-            `package.module:Name` is a policy of your own, checked against the contract first.
-        preset: the setting: paper or hard.
+        policies: names of policies; `default` is every one that is not slow and not made for another
+            preset, `all` is every one; `package.module:Name` is a policy of your own, checked
+            against the contract first.
+        preset: the setting: paper, hard or partial.
         study_seed: seed of the study; equal seeds give equal episodes.csv and table.csv.
         split: tile split: validation or fresh to evaluate, tuning for choices.
         terrain: ground of your own in place of the preset's, GeoTIFF or .npy (1 m a cell, row 0 south); the
@@ -96,7 +97,7 @@ def plan_study(options: Comparison) -> Study:
     for name in ("episodes", "workers", "slurm_jobs"):
         finite_number(name, getattr(options, name), at_least=1)
     finite_number("study_seed", options.study_seed, at_least=0)
-    policies, paths = choose_policies(options.policies)
+    policies, paths = choose_policies(options.policies, options.preset)
     preset, split = choose_ground(options)
     return Study(preset, policies, options.episodes, options.study_seed, split, paths)
 

@@ -2,8 +2,11 @@
 
 python -m studies.memory --train list       # the commands of the runs that are missing
 python -m studies.memory --train run        # train them one after the other; hours each
-python -m studies.memory                    # fly each run's chosen actor over the validation tiles
+python -m studies.memory                    # the table and the picture
 python -m studies.memory --runs runs/a runs/b rl/weights/td3.json
+
+Each run's chosen actor flies over the validation tiles; where an agent has no runs here, the card of its
+shipped weights tells how those of its seeds flew.
 
 A run's actor is chosen on the tuning tiles, as `python -m rl.train export` does. Per preset and agent the
 table gives the interquartile mean over seeds, the probability that a run with memory beats one without, and
@@ -29,6 +32,7 @@ from guidance.validation import finite_number
 from hda.presets import find_preset, unknown_name
 from rl.algorithms import RECIPES
 from rl.candidates import Choice
+from rl.policy import shipped, weights_name
 from studies.command_line import one_line_errors, open_folder
 from studies.memory_answer import GroupRow, compare_groups, conclude
 from studies.memory_report import draw_memory, markdown, write_csv
@@ -40,7 +44,8 @@ class MemoryStudy:
     """Compare agents with memory to one without, over training seeds.
 
     Attributes:
-        runs: run folders, and cards (.json) of exported weights; those of the plan under `root` by default.
+        runs: run folders, and cards (.json) of exported weights; by default the runs of the plan under
+            `root`, and for an agent that has none there the card of its shipped weights.
         agents: recipes of `python -m rl.train`; the first is the one without memory.
         presets: that they are trained on and fly.
         seeds: training seeds 0 to seeds - 1 of each agent on each preset.
@@ -106,6 +111,21 @@ def planned_runs(options: MemoryStudy) -> tuple[PlannedRun, ...]:
     )
 
 
+def find_sources(options: MemoryStudy) -> tuple[Path, ...]:
+    """Run folders of the plan that are there; for an agent without any on a preset, its shipped card."""
+    runs: dict[tuple[str, str], list[Path]] = {}
+    for run in planned_runs(options):
+        there = runs.setdefault((run.agent, run.preset), [])
+        if (run.folder / "run.json").exists():
+            there.append(run.folder)
+    cards = {key: shipped(weights_name(*key)).with_suffix(".json") for key in runs}
+    return tuple(
+        source
+        for key, there in runs.items()
+        for source in there or ([cards[key]] if cards[key].exists() else [])
+    )
+
+
 def _check(options: MemoryStudy) -> None:
     finite_number("seeds", options.seeds, at_least=1)
     finite_number("episodes", options.episodes, at_least=1)
@@ -149,10 +169,11 @@ def study_memory(options: MemoryStudy) -> tuple[GroupRow, ...]:
         train_missing(options, console)
         if options.train == "list":
             return ()
-    planned = planned_runs(options)
-    sources = options.runs or tuple(run.folder for run in planned if (run.folder / "run.json").exists())
+    sources = options.runs or find_sources(options)
     if not sources:
-        raise ValueError(f"no run of the plan under {options.root}; --train list gives the commands")
+        raise ValueError(
+            f"no run of the plan under {options.root}, no shipped weights; --train list gives the commands"
+        )
     out = open_folder(options.out)
     scores = collect_scores(sources, out / "scores.csv", options.episodes, options.choice, options.workers)
     reference = options.agents[0]

@@ -93,7 +93,7 @@ def plan_points(options: Robustness) -> tuple[Study, list[Point]]:
         ValueError: an option names something unknown.
     """
     preset = find_preset(options.preset)
-    policies, paths = choose_policies(options.policies)
+    policies, paths = choose_policies(options.policies, preset.name)
     own = Study(preset, policies, options.episodes, options.study_seed, options.split, paths)
     points = [Point(_NOMINAL, own)]
     for factor in choose_factors(options.factors):

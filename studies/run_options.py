@@ -17,8 +17,8 @@ class RunOptions:
     """Options of a run; a command adds its own, and describes those that mean something else there.
 
     Attributes:
-        policies: names of policies; `default` is every one that is not slow; `package.module:Name` is your
-            own.
+        policies: names of policies; `default` is every one that is not slow and not made for another
+            preset; `package.module:Name` is your own.
         episodes: episodes per policy.
         study_seed: seed of the study; equal seeds give equal episodes.
         split: tile split: validation or fresh.

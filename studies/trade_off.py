@@ -87,11 +87,11 @@ def plan_points(options: TradeOff) -> list[Point]:
     Raises:
         ValueError: an option names something unknown.
     """
-    policies, paths = choose_policies(options.policies)
     pairs = choose_weights(options.weights)
     points = []
     for name in options.presets:
         preset = find_preset(name)
+        policies, paths = choose_policies(options.policies, preset.name)
         study = Study(preset, policies, options.episodes, options.study_seed, options.split, paths)
         points.append(Point(f"{preset.name}/policies", study))
         if pairs:

@@ -1,5 +1,6 @@
 """Policies by name."""
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -11,6 +12,7 @@ from hda.policies.zem_zev import FixedGainZemZev
 from hda.policy import PrivilegedPolicy
 from hda.registry import PolicyEntry, policy_entry
 from hda.site_selection import NominalSite, OracleSite
+from studies.command_line import choose_policies
 
 
 @pytest.fixture(autouse=True)
@@ -99,3 +101,15 @@ def test_the_privileged_flag_of_every_entry_is_honest():
     for name in hda.policy_names():
         assert policy_entry(name).privileged == isinstance(hda.make_policy(name), PrivilegedPolicy)
     assert [name for name in OWN if policy_entry(name).privileged] == ["oracle"]
+
+
+def test_a_policy_made_for_a_preset_belongs_there_alone():
+    entry = PolicyEntry("mine", lambda: nominal("mine"), "trained on hard ground", preset="hard")
+    assert entry.belongs_on("hard")
+    assert not entry.belongs_on("paper")
+    assert not replace(entry, slow=True).belongs_on("hard")
+    assert all(policy_entry(name).belongs_on(preset) for name in OWN for preset in hda.PRESETS)
+    hda.register_policy(entry)
+    assert "mine" in choose_policies(("default",), "hard")[0]
+    assert "mine" not in choose_policies(("default",), "paper")[0]
+    assert choose_policies(("mine",), "paper")[0] == ("mine",)

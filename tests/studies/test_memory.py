@@ -14,10 +14,11 @@ from scipy.stats import ttest_ind
 
 from hda.presets import PRESETS
 from rl.algorithms import RECIPES
+from rl.artefacts import WEIGHTS_FOLDER
 from rl.candidates import Choice
 from rl.run_folder import TrainingPlan
 from rl.training import run_training
-from studies.memory import MemoryStudy, PlannedRun, planned_runs, study_memory
+from studies.memory import MemoryStudy, PlannedRun, find_sources, planned_runs, study_memory
 from studies.memory_answer import compare_groups, conclude, welch_interval
 from studies.memory_scores import (
     AgentScore,
@@ -198,6 +199,19 @@ def test_runs_are_flown_compared_and_drawn(root, tmp_path, capsys):
     assert "On paper, td3-lstm" in capsys.readouterr().out
 
 
+def test_agents_without_runs_are_read_from_their_cards(root, tmp_path):
+    card = WEIGHTS_FOLDER / "td3.json"
+    assert find_sources(options_for(tmp_path / "none", tmp_path)) == (
+        card,
+        *(path for path in (WEIGHTS_FOLDER / "td3-lstm.json",) if path.exists()),
+    )
+    runs = tuple(root / f"{agent}-paper-{seed}" for agent in ("td3", "td3-lstm") for seed in (0, 1))
+    assert find_sources(options_for(root, tmp_path)) == runs
+    shutil.copytree(runs[3], tmp_path / "runs" / runs[3].name)
+    here = options_for(tmp_path / "runs", tmp_path)
+    assert find_sources(here) == (card, tmp_path / "runs" / runs[3].name)
+
+
 def test_what_was_flown_is_not_flown_again(root, tmp_path):
     kept = tmp_path / "runs"
     shutil.copytree(root, kept)
@@ -244,7 +258,7 @@ def test_bad_options_are_named(tmp_path):
         ({"presets": ("papr",)}, "preset"),
         ({"seeds": 0}, "seeds"),
         ({"runs": (tmp_path / "none",)}, "not a run"),
-        ({}, "no run of the plan"),
+        ({"agents": ("ddpg", "tqc")}, "no run of the plan"),
     ):
         with pytest.raises(ValueError, match=message):
             study_memory(options_for(tmp_path / "empty", tmp_path / "out", **changes))

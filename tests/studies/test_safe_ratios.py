@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from hda.presets import PRESETS
-from hda.registry import policy_names
+from hda.registry import policy_entry, policy_names
 from studies.monte_carlo import Study, fly_chunk
 from studies.statistics import least_passing
 
@@ -54,8 +54,12 @@ def check(pin: Pin, episodes: int) -> None:
         )
 
 
-def test_every_policy_is_pinned_on_paper() -> None:
-    assert {pin.policy for pin in PINS if pin.preset == "paper"} == set(policy_names())
+@pytest.mark.parametrize("preset", ["paper", "partial"])
+def test_every_policy_is_pinned_where_it_belongs(preset: str) -> None:
+    made_for = {name: policy_entry(name).preset or "paper" for name in policy_names()}
+    assert {name for name in made_for if made_for[name] == preset} <= {
+        pin.policy for pin in PINS if pin.preset == preset
+    }
 
 
 @pytest.mark.parametrize("pin", [p for p in PINS if p.fast_episodes], ids=lambda p: f"{p.preset}-{p.policy}")
