@@ -51,7 +51,7 @@ class MemoryStudy:
         seeds: training seeds 0 to seeds - 1 of each agent on each preset.
         root: folder of the runs of the plan, AGENT-PRESET-SEED.
         train: list the commands of missing and unfinished runs, or run them first.
-        episodes: that each run's actor flies over the validation tiles.
+        validation_episodes: that each run's actor flies over the validation tiles.
         choice: how a run's actor is chosen on the tuning tiles.
         workers: processes that fly the candidates of a run.
         out: folder of the results.
@@ -63,7 +63,7 @@ class MemoryStudy:
     seeds: int = 3
     root: Annotated[Path, tyro.conf.arg(metavar="DIR")] = Path("runs")
     train: Literal["no", "list", "run"] = "no"
-    episodes: int = 1000
+    validation_episodes: int = 1000
     choice: Annotated[Choice, tyro.conf.arg(name="")] = field(default_factory=Choice)
     workers: int = 2
     out: Annotated[Path, tyro.conf.arg(metavar="DIR")] = Path("results/memory")
@@ -128,7 +128,7 @@ def find_sources(options: MemoryStudy) -> tuple[Path, ...]:
 
 def _check(options: MemoryStudy) -> None:
     finite_number("seeds", options.seeds, at_least=1)
-    finite_number("episodes", options.episodes, at_least=1)
+    finite_number("validation_episodes", options.validation_episodes, at_least=1)
     finite_number("workers", options.workers, at_least=1)
     for name in options.agents:
         if name not in RECIPES:
@@ -175,7 +175,7 @@ def study_memory(options: MemoryStudy) -> tuple[GroupRow, ...]:
             f"no run of the plan under {options.root}, no shipped weights; --train list gives the commands"
         )
     out = open_folder(options.out)
-    scores = collect_scores(sources, out / "scores.csv", options.episodes, options.choice, options.workers)
+    scores = collect_scores(sources, out / "scores.csv", options.validation_episodes, options.choice, options.workers)
     reference = options.agents[0]
     rows = compare_groups(scores, reference, np.random.default_rng(0))
     sentences = conclude(rows, reference)

@@ -71,7 +71,7 @@ def compare_groups(
     if len({score.episodes for score in scores}) > 1:
         raise ValueError(
             f"the agents flew unequal episodes: {sorted({score.episodes for score in scores})};"
-            " set --episodes to those of the cards"
+            " set --validation-episodes to those of the cards"
         )
     groups: dict[tuple[str, str], list[AgentScore]] = {}
     for score in scores:

@@ -13,7 +13,7 @@ import pytest
 ROOT = Path(__file__).parent.parent
 WRITTEN = sorted(path.relative_to(ROOT).as_posix() for path in (ROOT / "docs").rglob("*.md"))
 PAGES = ("README.md", "CONTRIBUTING.md", "SECURITY.md", *WRITTEN)
-_COMMAND = re.compile(r"python -m ([a-z_]+(?:\.[a-z_]+)*)((?: +[\w./:=+,-]+)*)")
+_COMMAND = re.compile(r"python -m ([a-z_]+(?:\.[a-z_]+)*)\b(?!\.[A-Z])((?: +[\w./:=+,-]+)*)")
 
 
 def read_page(page: str) -> str:
@@ -98,8 +98,6 @@ def commands() -> dict[str, set[str]]:
 @pytest.mark.parametrize("command", sorted(commands()))
 def test_every_option_of_a_command_exists(command: str) -> None:
     options = commands()[command] - {"--help", "--write"}
-    if not options:
-        return
     shown = subprocess.run(
         [sys.executable, "-m", *command.split(), "--help"],
         cwd=ROOT,

@@ -169,7 +169,7 @@ def options_for(root: Path, out: Path, **changes) -> MemoryStudy:
         presets=("paper",),
         seeds=2,
         root=root,
-        episodes=3,
+        validation_episodes=3,
         choice=Choice(averages=(1,), candidates=1, episodes=2),
         out=out,
     )
@@ -220,7 +220,7 @@ def test_what_was_flown_is_not_flown_again(root, tmp_path):
         shutil.rmtree(folder / "actors")  # nothing is left to fly
     assert study_memory(options_for(kept, tmp_path / "out")) == first
     with pytest.raises(ValueError, match="actors"):
-        study_memory(options_for(kept, tmp_path / "out", episodes=4))
+        study_memory(options_for(kept, tmp_path / "out", validation_episodes=4))
 
 
 def test_missing_and_unfinished_runs_are_listed(root, tmp_path, capsys):
