@@ -175,7 +175,8 @@ def study_memory(options: MemoryStudy) -> tuple[GroupRow, ...]:
             f"no run of the plan under {options.root}, no shipped weights; --train list gives the commands"
         )
     out = open_folder(options.out)
-    scores = collect_scores(sources, out / "scores.csv", options.validation_episodes, options.choice, options.workers)
+    kept, episodes = out / "scores.csv", options.validation_episodes
+    scores = collect_scores(sources, kept, episodes, options.choice, options.workers)
     reference = options.agents[0]
     rows = compare_groups(scores, reference, np.random.default_rng(0))
     sentences = conclude(rows, reference)
