@@ -7,20 +7,26 @@ The ground here is generated; yours may come from anywhere. An .npy file holds h
 row 0 at the south edge, NaN where the ground is unknown.
 """
 
-import sys
+from pathlib import Path
 
 import numpy as np
+import tyro
 
 from hda.presets import PAPER_TERRAIN
 from hda.terrain import generate_terrain, terrain_rng
 
 
-def write_site(path: str, seed: int = 50_000) -> None:
-    """Write one tile, with a strip of unknown ground along its west edge."""
+def write_site(path: tyro.conf.Positional[Path], seed: int = 50_000) -> None:
+    """Write one tile, with a strip of unknown ground along its west edge.
+
+    Args:
+        path: file to write, .npy.
+        seed: of the ground.
+    """
     heights = generate_terrain(PAPER_TERRAIN, terrain_rng(seed))
     heights[:, :20] = np.nan
     np.save(path, heights, allow_pickle=False)
 
 
 if __name__ == "__main__":
-    write_site(sys.argv[1])
+    tyro.cli(write_site)
