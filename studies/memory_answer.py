@@ -136,8 +136,10 @@ def conclude(rows: Sequence[GroupRow], reference: str) -> list[str]:
         if row.measure != MEASURES[0] or not row.verdict:
             continue
         d, p = row.difference, row.improvement
+        shown = row.verdict in ("helps", "harms")
+        answer = f"{row.agent} {row.verdict}" if shown else f"{row.verdict} for {row.agent}"
         sentences.append(
-            f"On {row.preset}, {row.agent} {row.verdict}: {d.estimate:+.1f} points of safe landings against"
+            f"On {row.preset}, {answer}: {d.estimate:+.1f} points of safe landings against"
             f" {reference} ({d.low:+.1f} to {d.high:+.1f}), probability of improvement {p.estimate:.2f}"
             f" ({p.low:.2f} to {p.high:.2f}), {row.seeds} seeds."
         )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -86,7 +87,9 @@ def test_verdicts_follow_the_intervals():
     assert helped.difference.estimate == pytest.approx(np.mean(WITH) - np.mean(WITHOUT))
     sentences = conclude(rows, "td3")
     assert len(sentences) == 3
-    assert "On partial, td3-lstm helps: +5.2 points" in sentences[1]
+    assert sentences[0].startswith("On paper, no difference shown for td3-lstm: +0.2 points")
+    assert sentences[1].startswith("On partial, td3-lstm helps: +5.2 points")
+    assert sentences[2].startswith("On partial, td3-lstm-plus harms: -10.0 points")
 
 
 def test_one_seed_shows_nothing():
@@ -196,7 +199,7 @@ def test_runs_are_flown_compared_and_drawn(root, tmp_path, capsys):
     )
     assert "| paper | td3-lstm | safe site | 2 |" in (tmp_path / "memory.md").read_text()
     assert (tmp_path / "memory.png").stat().st_size > 5000
-    assert "On paper, td3-lstm" in capsys.readouterr().out
+    assert re.search(r"On paper, .*td3-lstm.* points of safe", capsys.readouterr().out)
 
 
 def test_agents_without_runs_are_read_from_their_cards(root, tmp_path):
