@@ -15,7 +15,7 @@ from studies.compare import Comparison, compare, plan_study
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("site") / "site.npy"
-    write_site(str(path))
+    write_site(path)
     return path
 
 
