@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from dataclasses import replace
 
 from hda.policies.adjusted_descent import AdjustedDescent
 from hda.policies.composition import ComposedPolicy
@@ -21,20 +21,14 @@ _AGENTS = {
 }
 
 
-def _agent(agent: str) -> PolicyEntry:
-    """An agent trained on `paper`."""
-    return PolicyEntry(agent, _maker(agent, agent), _AGENTS[agent])
-
-
-def _agent_of(preset: str, agent: str) -> PolicyEntry:
-    """An agent trained on another preset."""
-    name = weights_name(agent, preset)
-    return PolicyEntry(name, _maker(name, agent), f"{_AGENTS[agent]}; trained on {preset}", preset=preset)
-
-
-def _maker(name: str, agent: str) -> Callable[[], AgentPolicy | RecurrentAgentPolicy]:
+def _agent(agent: str, preset: str = "paper") -> PolicyEntry:
+    """An agent as it was trained on a preset; that of `paper` belongs in every table."""
+    name, summary = weights_name(agent, preset), _AGENTS[agent]
     kind = RecurrentAgentPolicy if agent in WITH_MEMORY else AgentPolicy
-    return lambda: kind(name, shipped(name))
+    entry = PolicyEntry(name, lambda: kind(name, shipped(name)), summary)
+    if preset == "paper":
+        return entry
+    return replace(entry, summary=f"{summary}; trained on {preset}", preset=preset)
 
 
 _ENTRIES = (
@@ -60,7 +54,7 @@ _ENTRIES = (
     ("td3-lstm-plus", _agent("td3-lstm-plus")),
     ("td3-paper", _agent("td3-paper")),
     *(
-        (weights_name(agent, "partial"), _agent_of("partial", agent))
+        (weights_name(agent, "partial"), _agent(agent, "partial"))
         for agent in ("td3", "td3-lstm", "td3-lstm-plus")
     ),
 )
