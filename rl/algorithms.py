@@ -115,7 +115,7 @@ SAC_SETTINGS = replace(
     random_steps=5_000,
 )
 RECURRENT_RECIPES = {
-    "td3-lstm": RecurrentSettings(),
+    "td3-lstm": RecurrentSettings(control_prior_step=80_000, learning_rate_decay=(85_000, 115_000)),
     "td3-lstm-plus": RecurrentSettings(algorithm="td3-lstm-plus"),
 }
 RECIPES: dict[str, AgentSettings] = {

@@ -70,7 +70,9 @@ Command = (
     | Annotated[TrainAgent, tyro.conf.subcommand("td3-paper", default=TrainAgent(RECIPES["td3-paper"]))]
     | Annotated[
         TrainRecurrentAgent,
-        tyro.conf.subcommand("td3-lstm", default=TrainRecurrentAgent(RECURRENT_RECIPES["td3-lstm"])),
+        tyro.conf.subcommand(
+            "td3-lstm", default=TrainRecurrentAgent(RECURRENT_RECIPES["td3-lstm"], steps=120_000)
+        ),
     ]
     | Annotated[
         TrainRecurrentAgent,
