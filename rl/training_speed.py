@@ -3,7 +3,7 @@
 The agents with memory are measured apart: they learn from sequences, and there is no other to compare with.
 
 python -m rl.training_speed
-python -m rl.training_speed --profile    # and what the update of td3-lstm spends its time on
+python -m rl.training_speed --profile    # and what the update of td3-lstm spends its time on, and the bound
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class TrainingSpeed:
         sequences: per update of an agent with memory.
         length: transitions in each.
         memory: hidden size of its LSTMs.
-        profile: print what the update of td3-lstm spends its time on.
+        profile: print what the update of td3-lstm spends its time on, and how many this core can make.
     """
 
     rounds: int = 7
@@ -159,6 +159,37 @@ def profile_memory(options: TrainingSpeed) -> str:
     return taken.key_averages().table(sort_by="self_cpu_time_total", row_limit=12, max_name_column_width=40)
 
 
+def count_products(name: str, options: TrainingSpeed) -> float:
+    """Floating-point operations of the matrix products of one update (every second one moves the actor)."""
+    import warnings
+
+    import torch
+    from torch.utils.flop_counter import FlopCounterMode
+
+    agent = _filled_with_sequences(name, options)
+    agent.train(2)
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="TF32 acceleration")  # of a flag that is left as it is
+        # without oneDNN the LSTM consists of products that are counted
+        with torch.backends.mkldnn.flags(enabled=False), FlopCounterMode(display=False) as counter:
+            agent.train(2)
+    return counter.get_total_flops() / 2
+
+
+def measure_products(size: int = 1024, rounds: int = 20) -> float:
+    """Floating-point operations a second of one thread in a float32 product of two square matrices."""
+    import torch
+
+    torch.set_num_threads(1)
+    a, b = torch.ones(size, size), torch.ones(size, size)
+    times = []
+    for _ in range(rounds):
+        started = clock.process_time()
+        torch.mm(a, b)
+        times.append(clock.process_time() - started)
+    return 2.0 * size**3 / float(np.median(times))
+
+
 def main() -> None:
     """Command line."""
     options = tyro.cli(TrainingSpeed, description=__doc__)
@@ -170,6 +201,11 @@ def main() -> None:
         sys.stdout.write(f"{name:23s} {rate.processor:6.1f} updates/s, {rate.wall:6.1f} by the wall clock\n")
     if options.profile:
         sys.stdout.write(profile_memory(options))
+        products, rate = count_products("td3-lstm", options), measure_products()
+        sys.stdout.write(
+            f"an update of td3-lstm multiplies {products / 1e9:.2f} GFLOP, this core {rate / 1e9:.0f} "
+            f"GFLOP/s: at most {rate / products:.0f} updates/s in float32\n"
+        )
 
 
 if __name__ == "__main__":

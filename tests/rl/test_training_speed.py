@@ -2,7 +2,13 @@ from __future__ import annotations
 
 import pytest
 
-from rl.training_speed import TrainingSpeed, measure_memory_speed, measure_training_speed
+from rl.training_speed import (
+    TrainingSpeed,
+    count_products,
+    measure_memory_speed,
+    measure_products,
+    measure_training_speed,
+)
 
 
 @pytest.mark.slow
@@ -20,3 +26,21 @@ def test_the_speed_of_agents_with_memory_is_measured_in_both_precisions():
     for rate in speeds.values():
         assert rate.processor > 0.0
         assert 0.0 < rate.wall <= 1.05 * rate.processor  # one thread: the wall clock runs no slower
+
+
+def test_the_products_of_an_update_are_those_of_its_networks():
+    n, length, m, head, seen, action = 4, 3, 8, 256, 44, 5
+    options = TrainingSpeed(sequences=n, length=length, memory=m)
+    rows, one_more = length * n, (length + 1) * n
+    driving, recurrent = (seen + action) * 4 * m, 4 * m * m
+    lstm = driving + recurrent
+    present = {"actor": seen * m, "critic": (seen + action) * m}
+    joined = {"actor": 2 * m * head + head * action, "critic": 2 * m * head + head}
+    learnt_lstm = 2 * rows * lstm + (rows - n) * recurrent  # there and back, but for the zeros before
+    target = 3 * one_more * lstm + one_more * (present["actor"] + joined["actor"])
+    target += 2 * rows * (present["critic"] + joined["critic"])
+    critics = 2 * (learnt_lstm + rows * (2 * present["critic"] + 3 * joined["critic"]))
+    actor = learnt_lstm + rows * (2 * present["actor"] + 3 * joined["actor"])
+    actor += rows * lstm + 2 * rows * (present["critic"] + joined["critic"])  # the critic shows the way
+    assert count_products("td3-lstm", options) == 2 * (target + critics + actor / 2)
+    assert measure_products(128, 3) > 1e8
