@@ -109,6 +109,13 @@ FACTORS: dict[str, Factor] = {
             lambda preset, value: _lidar(preset, noise=value),
         ),
         Factor(
+            "map-dropout",
+            "share of the looks without a map",
+            lambda preset: preset.lidar.dropout,
+            (0.6, 0.4, 0.2, 0.0, 0.8),
+            lambda preset, value: _lidar(preset, dropout=value),
+        ),
+        Factor(
             "slant-limit",
             "sensor's limit off the vertical [deg]",
             lambda preset: math.degrees(preset.lidar.off_nadir_limit),
