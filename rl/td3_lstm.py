@@ -25,7 +25,9 @@ Deviations of the printed variant from Algorithm 3 as printed:
 8. The first `random_steps` have uniform actions; the learning rate may decay; and penalties (0 switches
    them off) keep the actor off the ends of its range and near 0. See `Hyperparameters` and
    `RecurrentTD3.action_prior`.
-9. Truncated episodes keep the value of their last observation; d = 1 only where the task itself ended.
+9. The mini-batch's history is printed with rewards and ends in it, the acting one without. Here both are the
+   observations and the actions before them, so that what learns sees what acts.
+10. Truncated episodes keep the value of their last observation; d = 1 only where the task itself ended.
 """
 
 from __future__ import annotations
