@@ -147,14 +147,14 @@ FACTORS: dict[str, Factor] = {
             "position-error",
             "error of the estimated position, per axis (1 sigma) [m]",
             lambda preset: preset.rules.navigation_position_error,
-            (5.0, 1.0, 2.0, 10.0),
+            (5.0, 1.0, 0.0, 2.0, 10.0),
             lambda preset, value: _rules(preset, navigation_position_error=value),
         ),
         Factor(
             "velocity-error",
             "error of the estimated velocity, per axis (1 sigma) [m/s]",
             lambda preset: preset.rules.navigation_velocity_error,
-            (0.5, 0.2, 0.1, 1.0),
+            (0.5, 0.2, 0.0, 0.1, 1.0),
             lambda preset, value: _rules(preset, navigation_velocity_error=value),
         ),
         Factor(
