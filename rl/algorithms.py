@@ -92,10 +92,10 @@ class RecurrentSettings(AgentSettings):
 
     algorithm: AlgorithmName = "td3-lstm"
     hidden: tuple[int, ...] = (256,)
-    learning_rate_decay: tuple[int, int] = (120_000, 160_000)
+    learning_rate_decay: tuple[int, int] = (85_000, 115_000)
     batch_size: int = 32
     smoothing_noise: float = 0.2
-    control_prior_step: int = 110_000
+    control_prior_step: int = 80_000
     random_steps: int = 20_000
     replay_size: int = 200_000
     memory: int = 128
@@ -115,8 +115,10 @@ SAC_SETTINGS = replace(
     random_steps=5_000,
 )
 RECURRENT_RECIPES = {
-    "td3-lstm": RecurrentSettings(control_prior_step=80_000, learning_rate_decay=(85_000, 115_000)),
-    "td3-lstm-plus": RecurrentSettings(algorithm="td3-lstm-plus"),
+    "td3-lstm": RecurrentSettings(),
+    "td3-lstm-plus": RecurrentSettings(
+        algorithm="td3-lstm-plus", control_prior_step=110_000, learning_rate_decay=(120_000, 160_000)
+    ),
 }
 RECIPES: dict[str, AgentSettings] = {
     "td3": TD3_SETTINGS,

@@ -58,7 +58,7 @@ class TrainRecurrentAgent(TrainAgent):
     """
 
     settings: tyro.conf.OmitArgPrefixes[RecurrentSettings]
-    steps: int = 170_000
+    steps: int = 120_000
 
 
 Command = (
@@ -70,14 +70,13 @@ Command = (
     | Annotated[TrainAgent, tyro.conf.subcommand("td3-paper", default=TrainAgent(RECIPES["td3-paper"]))]
     | Annotated[
         TrainRecurrentAgent,
-        tyro.conf.subcommand(
-            "td3-lstm", default=TrainRecurrentAgent(RECURRENT_RECIPES["td3-lstm"], steps=120_000)
-        ),
+        tyro.conf.subcommand("td3-lstm", default=TrainRecurrentAgent(RECURRENT_RECIPES["td3-lstm"])),
     ]
     | Annotated[
         TrainRecurrentAgent,
         tyro.conf.subcommand(
-            "td3-lstm-plus", default=TrainRecurrentAgent(RECURRENT_RECIPES["td3-lstm-plus"])
+            "td3-lstm-plus",
+            default=TrainRecurrentAgent(RECURRENT_RECIPES["td3-lstm-plus"], steps=170_000),
         ),
     ]
     | Annotated[ExportWeights, tyro.conf.subcommand("export")]

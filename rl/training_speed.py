@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import sys
 import time as clock
+import warnings
 from dataclasses import dataclass
 from typing import Any
 
@@ -161,8 +162,6 @@ def profile_memory(options: TrainingSpeed) -> str:
 
 def count_products(name: str, options: TrainingSpeed) -> float:
     """Floating-point operations of the matrix products of one update (every second one moves the actor)."""
-    import warnings
-
     import torch
     from torch.utils.flop_counter import FlopCounterMode
 
