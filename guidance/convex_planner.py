@@ -8,13 +8,21 @@ from dataclasses import replace
 from guidance.certificate import Certificate
 from guidance.convex import ConvexSolution
 from guidance.infeasibility import prove_fixed_time, prove_free_time
-from guidance.minimum_propellant import SHARE_TOLERANCE, ConvexTask, minimise_over_time, relaxation_tight
+from guidance.minimum_propellant import (
+    SHARE_TOLERANCE,
+    ConvexTask,
+    minimise_over_time,
+    minimise_with_true_bounds,
+    relaxation_tight,
+)
 from guidance.plan import Plan, PlanStatus
 from guidance.problem import LandingProblem
+from guidance.trajectory_guess import swing_sideways
 
 METHOD = "convex"
 _OVERDRAFT = 1e-9  # in ln(mass): rounding of the solver
 _REPLAN_TOLERANCE = 1.5e-5  # in ln(mass), as SHARE_TOLERANCE: 18 g at 1200 kg
+_LOCAL_GAP = 2e-3  # of propellant, over the relaxed flight's: not worth another guess
 _ERROR_TOLERANCE = 0.02  # [m] gain in landing error below which the time search stops
 _ERROR_SLACK = 0.05  # [m] landing error granted to the least-propellant step
 
@@ -68,8 +76,11 @@ def _finish(
         return replace(none, message=_shortage(problem, found))
     solution, more = task.refine(found)
     solves += more
+    if not _affordable(problem, solution) and time_of_flight is None:
+        outcome = minimise_with_true_bounds(task, SHARE_TOLERANCE, found.time)
+        solution, solves = outcome.solution or solution, solves + outcome.solves
     none = replace(none, solves=solves)
-    if not solution.solved or solution.propellant_share > problem.log_mass_ratio + _OVERDRAFT:
+    if not _affordable(problem, solution):
         words = "feasible only with thrust bounds relaxed outward: on the edge of what the lander can do"
         return replace(none, status=PlanStatus.LIMIT_REACHED, message=words)
     if not relaxation_tight(problem, solution):
@@ -79,18 +90,35 @@ def _finish(
     return Plan.of_flight(status, problem, METHOD, solution.trajectory(problem), solves)
 
 
+def _affordable(problem: LandingProblem, solution: ConvexSolution) -> bool:
+    """Whether there is a flight, and the propellant on board suffices for it."""
+    return solution.solved and solution.propellant_share <= problem.log_mass_ratio + _OVERDRAFT
+
+
 def _unrelaxed(lost: Plan, relaxed: ConvexSolution, time_of_flight: float | None) -> Plan:
-    """Ask the unrelaxed problem where relaxing lost something: from the relaxed flight, then from scratch."""
+    """Ask the unrelaxed problem where relaxing lost something: a local method, so from several guesses.
+
+    A flight that burns hardly more than the relaxed one ends the search; otherwise the best of all counts.
+    """
     from guidance.reference_casadi import plan_casadi
 
-    problem, solves, message = lost.problem, lost.solves, lost.message
-    flight = Plan.of_flight(PlanStatus.OPTIMAL, problem, METHOD, relaxed.trajectory(problem))
-    for guess in (flight, None):
-        found = plan_casadi(problem, flight.nodes, time_of_flight, guess)
-        solves, message = solves + found.solves, f"{found.message}; {lost.message}"
-        if found.status.has_flight:
-            return replace(found, solves=solves, message=message)
-    return replace(lost, solves=solves, message=message)
+    problem, solves = lost.problem, lost.solves
+    flight = relaxed.trajectory(problem)
+    nodes = flight["time"].size
+    bound = problem.state.mass * -math.expm1(-relaxed.propellant_share)
+    guesses = [flight, swing_sideways(problem, flight, in_plane=True), None]
+    best, said = lost, []
+    for guess in guesses:
+        start = None if guess is None else Plan.of_flight(PlanStatus.OPTIMAL, problem, METHOD, guess)
+        found = plan_casadi(problem, nodes, time_of_flight, start)
+        solves += found.solves
+        said.append(found.message)
+        if found.status.has_flight and not best.propellant <= found.propellant:
+            best = found
+        if best.propellant <= (1.0 + _LOCAL_GAP) * bound:
+            break
+    message = best.message if best.status.has_flight else said[0]
+    return replace(best, solves=solves, message=f"{message}; {lost.message}")
 
 
 def _shortage(problem: LandingProblem, solution: ConvexSolution) -> str:

@@ -15,15 +15,25 @@ from guidance.convex import ConvexSolution, convex_template
 from guidance.flight_time import TimeModel, TimeSearch
 from guidance.primer_vector import find_primer_flight
 from guidance.problem import LandingProblem
+from guidance.residuals import FLIGHT_TOLERANCE
 from guidance.scaling import scale_problem
-from guidance.time_window import guess_time, time_window
+from guidance.time_window import TimeWindow, guess_time, time_window
 
 Array = NDArray[np.float64]
 
 _THRUST_TOLERANCE = 5e-4  # relative; half of what a plan promises
+_DIP = FLIGHT_TOLERANCE.thrust_dip
 _COARSE_NODES = 13
 _NEAR_DEAD_TIME = 0.97  # first steps are small where the guess is good
 _MOST_REFINEMENTS = 8
+_STEPS_FROM_EDGE = (
+    1e-3,
+    3e-3,
+    1e-2,
+    3e-2,
+    0.1,
+    0.3,
+)  # relative changes of a time that the true bounds refuse
 SHARE_TOLERANCE = 4e-6
 """Gain in ln(mass) below which the time search stops: 5 g of propellant at 1200 kg."""
 
@@ -106,14 +116,26 @@ def relaxation_tight(problem: LandingProblem, solution: ConvexSolution) -> bool:
     """Whether the thrust itself, not only its slack, keeps min_thrust and the pointing limit to 0.1 %.
 
     It does wherever the convexification is lossless. It may not where the time of flight is fixed and too
-    long, or where the engine's least thrust exceeds the weight.
+    long, where the engine's least thrust exceeds the weight, or where the thrust turns round from one node to
+    the next and dips on the way.
     """
     push = solution.answer.primal[solution.layout.acceleration]
     size = np.linalg.norm(push, axis=1)
     ratio, limit = problem.lander.min_thrust / problem.lander.max_thrust, problem.lander.pointing_limit
-    if (size * np.exp(solution.log_mass)).min() < ratio * (1.0 - 2.0 * _THRUST_TOLERANCE):
+    thrust = size * np.exp(solution.log_mass)
+    if thrust.min() < ratio * (1.0 - 2.0 * _THRUST_TOLERANCE):
+        return False
+    if ratio > 0.0 and (_least_between(push) * np.exp(solution.log_mass[1:])).min() < ratio * (1.0 - _DIP):
         return False
     return limit is None or bool((push[:, 2] >= np.cos(limit) * size - 2.0 * _THRUST_TOLERANCE).all())
+
+
+def _least_between(push: Array) -> Array:
+    """Least magnitude on the straight way from each row to the next, shape (N - 1,)."""
+    way = np.diff(push, axis=0)
+    length = np.maximum((way**2).sum(axis=1), 1e-300)
+    share = np.clip(-(push[:-1] * way).sum(axis=1) / length, 0.0, 1.0)
+    return np.linalg.norm(push[:-1] + share[:, None] * way, axis=1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,6 +204,54 @@ def minimise_over_time(
                 reference = refined.log_mass if refined.solved else None
     search = TimeSearch(_evaluation(task, reference), window, tolerance, model)
     return TimeOutcome(search.run(start), solves + len(search.samples))
+
+
+def minimise_with_true_bounds(task: ConvexTask, tolerance: float, edge: float) -> TimeOutcome:
+    """Search the time of least cost where the relaxed search ended at a time that the true bounds refuse.
+
+    The relaxed thrust bounds admit flights that are a little too short. Where the optimum is the shortest
+    flight there is, the relaxed search ends on one of these. Here every time is judged with the true bounds.
+
+    Args:
+        task: what is solved at each time.
+        tolerance: gain below which the search stops, in units of the task's cost.
+        edge: [s] where the relaxed search ended.
+    """
+    solves, reference = 0, None
+
+    def evaluate(time: float) -> ConvexSolution:
+        nonlocal solves, reference
+        solution, more = _with_true_bounds(task, time, reference)
+        solves += more
+        if solution.solved:
+            reference = solution.log_mass
+        return solution
+
+    window = time_window(task.problem, task.free_landing_point)
+    for step in _STEPS_FROM_EDGE:
+        for time in (edge * (1.0 + step), edge / (1.0 + step)):
+            if not window.low <= time <= window.high:
+                continue
+            first = evaluate(time)
+            if first.solved:
+                low, high = (edge, window.high) if time > edge else (window.low, edge)
+                search = TimeSearch(evaluate, TimeWindow(low, high), tolerance, TimeModel(_asymptote(task)))
+                best = search.run(time, first)
+                return TimeOutcome(best, solves)
+    return TimeOutcome(None, solves)
+
+
+def _with_true_bounds(task: ConvexTask, time: float, reference: Array | None) -> tuple[ConvexSolution, int]:
+    """A solution that keeps the true thrust bounds, or one that is not solved; and the solves it took."""
+    first, solves = task.solve(time, reference), 1
+    solution, more = task.refine(first, reference)
+    solves += more
+    if not solution.solved and reference is not None:
+        solution, more = task.refine(task.solve(time))
+        solves += 1 + more
+    if solution.solved and more == _MOST_REFINEMENTS:
+        solution = replace(solution, answer=replace(solution.answer, status=SolveStatus.LIMIT_REACHED))
+    return solution, solves
 
 
 def _evaluation(task: ConvexTask, reference: Array | None) -> Callable[[float], ConvexSolution]:

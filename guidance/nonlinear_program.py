@@ -95,7 +95,8 @@ class _Stages:
         """State every stage."""
         self._ca, self._limits = ca, limits
         vectors = dict.fromkeys(("position", "velocity", "gravity"), 3)
-        scalars = ("flow", "least_thrust", "dry", "smoothing", "pointing", "glide", "speed", "low", "high")
+        scalars = ("flow", "least_thrust", "least_midway", "dry", "smoothing", "pointing", "glide", "speed")
+        scalars += ("low", "high")
         sizes = vectors | dict.fromkeys(scalars, 1)
         self.numbers = {name: ca.SX.sym(name, size) for name, size in sizes.items()}
         width = 11 if limits.free_time else 10
@@ -137,7 +138,7 @@ class _Stages:
         if self._limits.free_time:
             there.append(time)
         self._add(self.states[k + 1] - ca.vertcat(*there), 0.0, 0.0)
-        self._add(ca.exp(z - 0.5 * burnt) * middle - p["least_thrust"])
+        self._add(ca.exp(z - 0.5 * burnt) * middle - p["least_midway"])
 
     def _state_limits(self, k: int) -> None:
         x, p, ca, last = self.states[k], self.numbers, self._ca, self._limits.nodes - 1
@@ -171,9 +172,9 @@ class _Stages:
 def nonlinear_program(limits: Limits, solver: NonlinearSolver) -> NonlinearProgram:
     """Assemble for a mesh and a set of limits; kept, since every number of a case is a parameter.
 
-    The parameters, scaled: position (3), velocity (3), gravity (3), mass flow, least thrust, ln of the dry
-    mass, smoothing of |u|, cosine of the pointing limit, glide slope limit [rad], speed limit, shortest and
-    longest time of flight.
+    The parameters, scaled: position (3), velocity (3), gravity (3), mass flow, least thrust at nodes and
+    midway between, ln of the dry mass, smoothing of |u|, cosine of the pointing limit, glide slope limit
+    [rad], speed limit, shortest and longest time of flight.
     """
     import casadi as ca
 

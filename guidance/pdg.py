@@ -5,7 +5,8 @@ python -m guidance.pdg --state 200 100 950 -8 -4 -30 1200 --target 0 0 50 --plot
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Literal
 
@@ -24,6 +25,8 @@ from guidance.validation import finite_number, finite_vector
 DEFAULT_NODES = 61
 """Nodes of a plan unless asked otherwise: they cost about 5 g of propellant on the paper's descents."""
 FEWEST_NODES = 5
+MOST_NODES = 1000
+"""A plan that does not keep its limits on so many nodes is none."""
 METHODS = ("convex", "casadi", "cvxpy")
 UNREACHABLE = ("raise", "nearest")
 
@@ -53,7 +56,8 @@ def solve_pdg(
         glide_slope_limit: [rad] greatest angle from the z axis, seen from the landing point, in (0, pi/2].
         speed_limit: [m/s] greatest speed.
         time_of_flight: [s] None searches for the best.
-        nodes: N; the plan has N - 1 intervals of equal duration.
+        nodes: N; the plan has N - 1 intervals of equal duration. Where the plan, flown, does not keep its
+            limits between so few nodes, it gets more.
         method: 'convex' (lossless convexification in Clarabel; where that loses min_thrust or the pointing
             limit it asks 'casadi', and `plan.method` says so), 'cvxpy' (the same problem, for reading) or
             'casadi' (the unrelaxed nonconvex problem by fatrop or IPOPT).
@@ -83,7 +87,9 @@ def solve_pdg(
     if time_of_flight is not None:
         time_of_flight = finite_number("time_of_flight", time_of_flight, above=0.0)
     plan = _plan(problem, nodes, time_of_flight, method, guess)
-    if plan.status is not PlanStatus.OPTIMAL:
+    if plan.status is PlanStatus.OPTIMAL:
+        plan = _within_limits(plan, lambda finer, found: _plan(problem, finer, time_of_flight, method, found))
+    else:
         plan = _without_flight(plan, nodes, time_of_flight, unreachable)
     if throw and not plan.status.has_flight:
         raise _error(plan)
@@ -146,6 +152,30 @@ def _plan(
     return plan
 
 
+def _within_limits(plan: Plan, plan_again: Callable[[int, Plan], Plan]) -> Plan:
+    """Fly the plan; where it misses its limits plan again on a finer mesh, or say that it misses them.
+
+    What a mesh hides falls with the square of its intervals.
+
+    Args:
+        plan: a plan with a flight.
+        plan_again: (nodes, plan found so far) -> plan.
+    """
+    while plan.status.has_flight:
+        excess = plan.residuals.excess(plan.problem)
+        worst = max(excess, key=lambda name: excess[name])
+        if excess[worst] <= 1.0:
+            return plan
+        finer = 1 + math.ceil((plan.nodes - 1) * min(max(1.2 * math.sqrt(excess[worst]), 1.5), 4.0))
+        words = f"flown on {plan.nodes} nodes the plan misses {worst} by {getattr(plan.residuals, worst):.3g}"
+        missed = Plan(PlanStatus.LIMIT_REACHED, plan.problem, plan.method, message=words, solves=plan.solves)
+        if finer > MOST_NODES:
+            return missed
+        again = plan_again(finer, plan)
+        plan = replace(again if again.status.has_flight else missed, solves=plan.solves + again.solves)
+    return plan
+
+
 def _without_flight(plan: Plan, nodes: int, time_of_flight: float | None, unreachable: str) -> Plan:
     """Tell infeasible from failed by a certificate, or fly to the nearest reachable point."""
     from guidance.convex_planner import plan_convex, plan_nearest, prove_infeasible
@@ -155,7 +185,7 @@ def _without_flight(plan: Plan, nodes: int, time_of_flight: float | None, unreac
         nearest = plan_nearest(problem, nodes, time_of_flight)
         nearest = replace(nearest, solves=plan.solves + nearest.solves)
         if nearest.status.has_flight:
-            return nearest
+            return _within_limits(nearest, lambda finer, _: plan_nearest(problem, finer, time_of_flight))
         anywhere = nearest.status is PlanStatus.INFEASIBLE
         if anywhere:
             plan = replace(nearest, method=plan.method)
@@ -168,7 +198,8 @@ def _without_flight(plan: Plan, nodes: int, time_of_flight: float | None, unreac
     if plan.method == "convex" and proof is not None and time_of_flight is None and not anywhere:
         retry = plan_convex(problem, nodes, None, proof.time)
         if retry.status.has_flight:
-            return replace(retry, solves=plan.solves + retry.solves)
+            retry = replace(retry, solves=plan.solves + retry.solves)
+            return _within_limits(retry, lambda finer, found: _plan(problem, finer, None, "convex", found))
     if plan.status is PlanStatus.INFEASIBLE:
         message = f"{plan.message}; infeasibility could not be proved"
         return replace(plan, status=PlanStatus.LIMIT_REACHED, message=message)

@@ -24,23 +24,31 @@ from guidance.plan import Plan, PlanStatus
 from guidance.problem import LandingProblem
 from guidance.reference_units import Units
 from guidance.time_window import guess_time, time_window
-from guidance.trajectory_guess import least_energy_flight, rest_of_flight
+from guidance.trajectory_guess import is_vertical, least_energy_flight, rest_of_flight, swing_sideways
 
 METHOD = "casadi"
 _SMOOTHING = 2e-5  # of full thrust; an engine that cannot stop needs none of it
+_COARSE_SMOOTHING = 1e-2  # of full thrust, for a flight to start from
+_GREATEST_LEAST = 1.0 - 5e-4  # of full thrust: an interior-point method needs room between two bounds
+_GREATEST_MIDWAY = 0.98  # of full thrust: an engine without throttle may turn by 23 degrees an interval
 
 Array = NDArray[np.float64]
 
 
-def _parameters(problem: LandingProblem, units: Units, ends: tuple[float, float]) -> Array:
+def _parameters(problem: LandingProblem, units: Units, ends: tuple[float, float], smoothing: float) -> Array:
     lander = problem.lander
+    least = lander.min_thrust / lander.max_thrust
     return np.concatenate(
         [
             problem.offset / units.length,
             problem.state.velocity / units.speed,
             problem.gravity / units.acceleration,
-            [units.speed / lander.exhaust_velocity, lander.min_thrust / lander.max_thrust],
-            [-problem.log_mass_ratio, 1e-8 if lander.min_thrust > 0.0 else _SMOOTHING],
+            [
+                units.speed / lander.exhaust_velocity,
+                min(least, _GREATEST_LEAST),
+                min(least, _GREATEST_MIDWAY),
+            ],
+            [-problem.log_mass_ratio, 1e-8 if lander.min_thrust > 0.0 else smoothing],
             [math.cos(lander.pointing_limit or math.pi)],
             [problem.glide_slope_limit or 0.0, (problem.speed_limit or 0.0) / units.speed],
             np.array(ends) / units.time,
@@ -110,13 +118,13 @@ def plan_casadi(
     else:
         start = least_energy_flight(problem, nodes, time_of_flight or guess_time(problem, window))
     ends = (window.low, window.high) if time_of_flight is None else (time_of_flight, time_of_flight)
-    question = _Question(problem, limits, start, ends)
+    question = _Question(problem, limits, swing_sideways(problem, start), ends)
     chosen = solver or limits.solver
-    plan = question.ask(chosen)
+    plan = question.answer(chosen)
     if plan.status.has_flight or solver is not None or chosen == "ipopt":
         return plan
-    again = question.ask("ipopt")
-    return replace(again, message=f"{again.message}; after {plan.message}", solves=2)
+    again = question.answer("ipopt")
+    return replace(again, message=f"{again.message}; after {plan.message}", solves=plan.solves + again.solves)
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,15 +136,29 @@ class _Question:
     start: dict[str, Array]
     ends: tuple[float, float]
 
-    def ask(self, solver: NonlinearSolver) -> Plan:
-        """Solve it by one solver."""
+    def answer(self, solver: NonlinearSolver) -> Plan:
+        """Solve it by one solver.
+
+        A coasting engine on a vertical flight stands on the kink of |u| in every direction at once: there the
+        flight of a coarsely smoothed |u| comes first, and the answer starts from it.
+        """
+        if self.problem.lander.min_thrust > 0.0 or not is_vertical(self.problem):
+            return self._ask(solver, _SMOOTHING)
+        coarse = self._ask(solver, _COARSE_SMOOTHING)
+        if not coarse.status.has_flight:
+            return coarse
+        start = rest_of_flight(self.problem, coarse, coarse.nodes)
+        fine = replace(self, start=swing_sideways(self.problem, start))._ask(solver, _SMOOTHING)
+        return replace(fine, solves=coarse.solves + fine.solves)
+
+    def _ask(self, solver: NonlinearSolver, smoothing: float) -> Plan:
         problem, limits, units = self.problem, self.limits, Units.of(self.problem)
         program = nonlinear_program(limits, solver)
         failed = Plan(PlanStatus.SOLVER_FAILED, problem, METHOD, solves=1)
         try:
             answer = program.solver(
                 x0=_pack(units, problem, self.start, limits.free_time),
-                p=_parameters(problem, units, self.ends),
+                p=_parameters(problem, units, self.ends, smoothing),
                 lbg=program.lower,
                 ubg=program.upper,
             )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,6 +11,9 @@ from guidance.plan import Plan
 from guidance.problem import LandingProblem
 
 Array = NDArray[np.float64]
+
+_ON_AXIS = 1e-6  # horizontal extent over the whole below which a descent counts as vertical
+_SWING = 0.01  # of full thrust
 
 
 def least_energy_flight(problem: LandingProblem, nodes: int, time: float) -> dict[str, Array]:
@@ -55,3 +60,36 @@ def rest_of_flight(problem: LandingProblem, earlier: Plan, nodes: int) -> dict[s
         "mass": np.minimum(mass, problem.state.mass),
         "thrust": earlier.thrust_at(times),
     }
+
+
+def is_vertical(problem: LandingProblem) -> bool:
+    """Whether nothing in the problem points sideways, so that every horizontal direction is alike."""
+    vectors = np.array([problem.offset, problem.state.velocity, problem.gravity])
+    across = np.linalg.norm(vectors[:, :2], axis=1)
+    return bool((across <= _ON_AXIS * np.maximum(np.linalg.norm(vectors, axis=1), 1e-300)).all())
+
+
+def swing_sideways(
+    problem: LandingProblem, flight: dict[str, Array], in_plane: bool = False
+) -> dict[str, Array]:
+    """Give a guess the sideways thrust that a local method cannot find by itself.
+
+    A vertical guess is symmetric: no derivative points to either side, and the method stays on the axis. It
+    gets a hundredth of full thrust. And a thrust below min_thrust, as a relaxed flight has, is brought up to
+    it by a push to one side and back, a full wave of cosine: landing point and speed stay as they were.
+
+    Args:
+        problem: the landing problem.
+        flight: a guess by name, as `least_energy_flight` gives it.
+        in_plane: whether to push towards the target and back, in place of across the way to it.
+    """
+    thrust = flight["thrust"]
+    size = np.linalg.norm(thrust, axis=1)
+    lack = np.sqrt(np.maximum(problem.lander.min_thrust**2 - size**2, 0.0))
+    push = np.maximum(lack, _SWING * problem.lander.max_thrust if is_vertical(problem) else 0.0)
+    if not push.any():
+        return flight
+    east, north = problem.offset[:2] if problem.offset[:2].any() else (0.0, 1.0)
+    side = np.array([east, north, 0.0] if in_plane else [north, -east, 0.0]) / math.hypot(east, north)
+    wave = np.cos(np.linspace(0.0, 2.0 * np.pi, size.size))
+    return flight | {"thrust": thrust + (push * wave)[:, None] * side}
