@@ -13,6 +13,7 @@ from guidance.minimum_propellant import (
     ConvexTask,
     minimise_over_time,
     minimise_with_true_bounds,
+    promised_gain,
     relaxation_tight,
 )
 from guidance.plan import Plan, PlanStatus
@@ -23,6 +24,7 @@ METHOD = "convex"
 _OVERDRAFT = 1e-9  # in ln(mass): rounding of the solver
 _REPLAN_TOLERANCE = 1.5e-5  # in ln(mass), as SHARE_TOLERANCE: 18 g at 1200 kg
 _LOCAL_GAP = 2e-3  # of propellant, over the relaxed flight's: not worth another guess
+_WORTH_A_SEARCH = 4e-5  # gain in ln(mass) that the true bounds may leave after a search with relaxed ones
 _ERROR_TOLERANCE = 0.02  # [m] gain in landing error below which the time search stops
 _ERROR_SLACK = 0.05  # [m] landing error granted to the least-propellant step
 
@@ -76,8 +78,11 @@ def _finish(
         return replace(none, message=_shortage(problem, found))
     solution, more = task.refine(found)
     solves += more
-    if not _affordable(problem, solution) and time_of_flight is None:
-        outcome = minimise_with_true_bounds(task, SHARE_TOLERANCE, found.time)
+    affordable = _affordable(problem, solution)
+    if time_of_flight is None and (not affordable or promised_gain(task, solution) > _WORTH_A_SEARCH):
+        outcome = minimise_with_true_bounds(
+            task, SHARE_TOLERANCE, found.time, solution if affordable else None
+        )
         solution, solves = outcome.solution or solution, solves + outcome.solves
     none = replace(none, solves=solves)
     if not _affordable(problem, solution):

@@ -206,18 +206,22 @@ def minimise_over_time(
     return TimeOutcome(search.run(start), solves + len(search.samples))
 
 
-def minimise_with_true_bounds(task: ConvexTask, tolerance: float, edge: float) -> TimeOutcome:
-    """Search the time of least cost where the relaxed search ended at a time that the true bounds refuse.
+def minimise_with_true_bounds(
+    task: ConvexTask, tolerance: float, near: float, known: ConvexSolution | None = None
+) -> TimeOutcome:
+    """Search the time of least cost with every time judged by the true thrust bounds.
 
-    The relaxed thrust bounds admit flights that are a little too short. Where the optimum is the shortest
-    flight there is, the relaxed search ends on one of these. Here every time is judged with the true bounds.
+    The relaxed bounds admit flights that are a little too short. Where the optimum is the shortest flight
+    there is, or the burns are long, the relaxed search ends on a time that the true bounds refuse or price
+    much higher.
 
     Args:
         task: what is solved at each time.
         tolerance: gain below which the search stops, in units of the task's cost.
-        edge: [s] where the relaxed search ended.
+        near: [s] where the relaxed search ended.
+        known: a solution at that time that keeps the true bounds; None if they refuse it.
     """
-    solves, reference = 0, None
+    solves, reference = 0, None if known is None else known.log_mass
 
     def evaluate(time: float) -> ConvexSolution:
         nonlocal solves, reference
@@ -228,17 +232,25 @@ def minimise_with_true_bounds(task: ConvexTask, tolerance: float, edge: float) -
         return solution
 
     window = time_window(task.problem, task.free_landing_point)
+    model = TimeModel(_asymptote(task))
+    if known is not None:
+        return TimeOutcome(TimeSearch(evaluate, window, tolerance, model).run(near, known), solves)
     for step in _STEPS_FROM_EDGE:
-        for time in (edge * (1.0 + step), edge / (1.0 + step)):
+        for time in (near * (1.0 + step), near / (1.0 + step)):
             if not window.low <= time <= window.high:
                 continue
             first = evaluate(time)
             if first.solved:
-                low, high = (edge, window.high) if time > edge else (window.low, edge)
-                search = TimeSearch(evaluate, TimeWindow(low, high), tolerance, TimeModel(_asymptote(task)))
+                low, high = (near, window.high) if time > near else (window.low, near)
+                search = TimeSearch(evaluate, TimeWindow(low, high), tolerance, model)
                 best = search.run(time, first)
                 return TimeOutcome(best, solves)
     return TimeOutcome(None, solves)
+
+
+def promised_gain(task: ConvexTask, solution: ConvexSolution) -> float:
+    """What another time of flight promises by the derivative at this one, in units of the task's cost."""
+    return TimeModel(_asymptote(task)).gain(solution)
 
 
 def _with_true_bounds(task: ConvexTask, time: float, reference: Array | None) -> tuple[ConvexSolution, int]:
