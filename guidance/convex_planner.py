@@ -24,7 +24,7 @@ METHOD = "convex"
 _OVERDRAFT = 1e-9  # in ln(mass): rounding of the solver
 _REPLAN_TOLERANCE = 1.5e-5  # in ln(mass), as SHARE_TOLERANCE: 18 g at 1200 kg
 _LOCAL_GAP = 2e-3  # of propellant, over the relaxed flight's: not worth another guess
-_WORTH_A_SEARCH = 4e-5  # gain in ln(mass) that the true bounds may leave after a search with relaxed ones
+_WORTH_A_SEARCH = 2e-3  # gain in ln(mass) that a time found with relaxed bounds may promise to another time
 _ERROR_TOLERANCE = 0.02  # [m] gain in landing error below which the time search stops
 _ERROR_SLACK = 0.05  # [m] landing error granted to the least-propellant step
 

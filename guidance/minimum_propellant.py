@@ -15,7 +15,7 @@ from guidance.convex import ConvexSolution, convex_template
 from guidance.flight_time import TimeModel, TimeSearch
 from guidance.primer_vector import find_primer_flight
 from guidance.problem import LandingProblem
-from guidance.residuals import FLIGHT_TOLERANCE
+from guidance.residuals import FLIGHT_TOLERANCE, pointing_excess
 from guidance.scaling import scale_problem
 from guidance.time_window import TimeWindow, guess_time, time_window
 
@@ -127,7 +127,7 @@ def relaxation_tight(problem: LandingProblem, solution: ConvexSolution) -> bool:
         return False
     if ratio > 0.0 and (_least_between(push) * np.exp(solution.log_mass[1:])).min() < ratio * (1.0 - _DIP):
         return False
-    return limit is None or bool((push[:, 2] >= np.cos(limit) * size - 2.0 * _THRUST_TOLERANCE).all())
+    return pointing_excess(push, limit) <= FLIGHT_TOLERANCE.pointing
 
 
 def _least_between(push: Array) -> Array:

@@ -12,6 +12,7 @@ from guidance.errors import GuidanceError
 from guidance.lander import Lander
 from guidance.pdg import DEFAULT_NODES, solve_pdg
 from guidance.plan import Plan
+from guidance.residuals import RESIDUAL_UNITS
 
 
 @dataclass(frozen=True)
@@ -79,15 +80,15 @@ class PdgCommand:
 
 def describe(plan: Plan) -> str:
     """A plan in a few lines: what it costs, and what it misses when flown through the true motion."""
-    flown = plan.residuals
+    flown = [f"{name} {getattr(plan.residuals, name):.2g} {unit}" for name, unit in RESIDUAL_UNITS.items()]
     return "\n".join(
         [
             f"status          {plan.status.value} ({plan.method})",
             f"time of flight  {plan.time_of_flight:.3f} s, {plan.nodes} nodes",
             f"propellant      {plan.propellant:.3f} kg, final mass {plan.mass[-1]:.3f} kg",
             f"landing error   {plan.landing_error:.2f} m",
-            f"flown           misses the plan by {flown.position:.2g} m and {flown.velocity:.2g} m/s, "
-            f"thrust exceeds its bounds by {max(flown.thrust_above, flown.thrust_below):.2g} N",
+            "flown, it misses what was planned or allowed by",
+            *(f"                {', '.join(flown[k : k + 3])}" for k in range(0, len(flown), 3)),
         ]
     )
 

@@ -175,3 +175,11 @@ class Plan:
         from guidance.residuals import fly_residuals
 
         return fly_residuals(self)
+
+    @property
+    def keeps_limits(self) -> bool:
+        """Whether there is a flight and, flown, it lands where it says and keeps every limit.
+
+        The tolerance is `guidance.residuals.FLIGHT_TOLERANCE`.
+        """
+        return self.nodes > 0 and self.residuals.keeps_limits(self.problem)

@@ -28,6 +28,7 @@ from guidance.trajectory_guess import is_vertical, least_energy_flight, rest_of_
 
 METHOD = "casadi"
 _SMOOTHING = 2e-5  # of full thrust; an engine that cannot stop needs none of it
+_LONG = 2e4  # [m] way beyond which the smoothing is finer
 _COARSE_SMOOTHING = 1e-2  # of full thrust, for a flight to start from
 _GREATEST_LEAST = 1.0 - 5e-4  # of full thrust: an interior-point method needs room between two bounds
 _GREATEST_MIDWAY = 0.98  # of full thrust: an engine without throttle may turn by 23 degrees an interval
@@ -143,13 +144,18 @@ class _Question:
         flight of a coarsely smoothed |u| comes first, and the answer starts from it.
         """
         if self.problem.lander.min_thrust > 0.0 or not is_vertical(self.problem):
-            return self._ask(solver, _SMOOTHING)
+            return self._ask(solver, self._smoothing)
         coarse = self._ask(solver, _COARSE_SMOOTHING)
         if not coarse.status.has_flight:
             return coarse
         start = rest_of_flight(self.problem, coarse, coarse.nodes)
-        fine = replace(self, start=swing_sideways(self.problem, start))._ask(solver, _SMOOTHING)
+        fine = replace(self, start=swing_sideways(self.problem, start))._ask(solver, self._smoothing)
         return replace(fine, solves=coarse.solves + fine.solves)
+
+    @property
+    def _smoothing(self) -> float:
+        """It hides propellant all along a flight, and so metres at the end of a long one."""
+        return _SMOOTHING * min(1.0, _LONG / Units.of(self.problem).length)
 
     def _ask(self, solver: NonlinearSolver, smoothing: float) -> Plan:
         problem, limits, units = self.problem, self.limits, Units.of(self.problem)

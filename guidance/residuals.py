@@ -51,6 +51,24 @@ class FlightTolerance:
 FLIGHT_TOLERANCE = FlightTolerance()
 """What planning, the timing study and the tests hold every plan to."""
 
+RESIDUAL_UNITS = {
+    "position": "m",
+    "velocity": "m/s",
+    "mass": "kg",
+    "landing_position": "m",
+    "landing_velocity": "m/s",
+    "thrust_above": "N",
+    "thrust_below": "N",
+    "thrust_dip": "N",
+    "pointing": "rad",
+    "glide_slope": "m",
+    "altitude": "m",
+    "speed": "m/s",
+    "propellant": "kg",
+    "relaxation_gap": "N",
+}
+"""Unit of each of the `Residuals`."""
+
 
 @dataclass(frozen=True)
 class Residuals:
@@ -89,16 +107,13 @@ class Residuals:
     propellant: float
     relaxation_gap: float
 
-    def excess(
-        self, problem: LandingProblem, tolerance: FlightTolerance = FLIGHT_TOLERANCE
-    ) -> dict[str, float]:
-        """Each departure that a limit bounds, in units of its tolerance: above one is too much.
+    def excess(self, problem: LandingProblem) -> dict[str, float]:
+        """Each departure that a limit bounds, by name, in units of what `FLIGHT_TOLERANCE` allows of it.
 
         Args:
             problem: what the plan was asked.
-            tolerance: what is allowed.
         """
-        lander = problem.lander
+        lander, tolerance = problem.lander, FLIGHT_TOLERANCE
         unit = max(1.0, float(np.linalg.norm(problem.gravity)) / -MOON_GRAVITY[2])
         allowed = {
             "position": tolerance.position * unit,
@@ -113,6 +128,10 @@ class Residuals:
             "propellant": tolerance.propellant,
         }
         return {name: getattr(self, name) / bound for name, bound in allowed.items()}
+
+    def keeps_limits(self, problem: LandingProblem) -> bool:
+        """Whether the flown plan lands where it says and keeps every limit of `problem`, to the tolerance."""
+        return max(self.excess(problem).values()) <= 1.0
 
 
 @compile_kernel
@@ -185,7 +204,8 @@ def fly_plan(plan: Plan) -> Array:
     return out
 
 
-def _pointing_excess(thrust: Array, limit: float | None) -> float:
+def pointing_excess(thrust: Array, limit: float | None) -> float:
+    """[rad] by how much thrusts, shape (N, 3) in any unit, lean beyond a limit; next to none has no lean."""
     size = np.linalg.norm(thrust, axis=1)
     burning = size > 1e-3 * max(float(size.max()), 1e-9)
     if limit is None or not burning.any():
@@ -233,7 +253,7 @@ def fly_residuals(plan: Plan) -> Residuals:
         thrust_above=max(0.0, float(size.max()) - lander.max_thrust),
         thrust_below=max(0.0, lander.min_thrust - float(size[::_BETWEEN].min())),
         thrust_dip=max(0.0, lander.min_thrust - float(size.min())),
-        pointing=_pointing_excess(plan.thrust, lander.pointing_limit),
+        pointing=pointing_excess(plan.thrust, lander.pointing_limit),
         glide_slope=_glide_excess(flown[:, :3] - flown[-1, :3], problem.glide_slope_limit),
         altitude=max(0.0, float(problem.target[2] - fine[:, 2].min())),
         speed=0.0 if problem.speed_limit is None else max(0.0, speed - problem.speed_limit),

@@ -124,7 +124,7 @@ def time_window(problem: LandingProblem, free_landing_point: bool = False) -> Ti
     lift = push + float(problem.gravity[2])
     sink, height = min(0.0, float(state.velocity[2])), float(problem.offset[2])
     if sink < 0.0 and sink * sink > 2.0 * lift * height:
-        return TimeWindow(math.inf, -math.inf, "altitude")
+        return TimeWindow(math.inf, -math.inf, "altitude" if lift > 0.0 else "maximum thrust")
     speed, distance = float(np.linalg.norm(state.velocity)), float(np.linalg.norm(problem.offset))
     pace = max(speed / push + math.sqrt(2.0 * distance / push), 1e-3)
     high = 100.0 * pace

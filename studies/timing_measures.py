@@ -9,7 +9,7 @@ from time import perf_counter, process_time
 import numpy as np
 from rich.progress import track
 
-from guidance import Plan, PlanStatus
+from guidance import PlanStatus
 from studies.timing_methods import Case, Method
 
 
@@ -71,22 +71,6 @@ class Summary:
     solves: float
 
 
-def keeps_limits(plan: Plan) -> bool:
-    """Whether the plan, flown through the true motion, lands where it says and keeps every limit."""
-    if not plan.status.has_flight:
-        return False
-    flown, lander = plan.residuals, plan.problem.lander
-    return (
-        max(flown.position, flown.glide_slope) < 0.5
-        and flown.altitude < 0.2
-        and flown.velocity < 0.1
-        and flown.thrust_above <= 1e-3 * lander.max_thrust
-        and flown.thrust_below <= 1e-3 * lander.min_thrust + 1e-9
-        and flown.pointing < 1e-2
-        and flown.propellant < 1e-3
-    )
-
-
 def time_quantiles(seconds: Sequence[float]) -> tuple[float, float, float]:
     """Median, 99 % quantile (a measured value, the next one up) and maximum."""
     if not seconds:
@@ -116,7 +100,7 @@ def measure_call(method: Method, case: Case) -> Call:
         processor,
         plan.propellant - case.propellant,
         plan.solves,
-        keeps_limits(plan),
+        plan.keeps_limits,
     )
 
 

@@ -16,7 +16,6 @@ from studies.timing import Timing, study_timing
 from studies.timing_conclusions import compare_methods, conclude
 from studies.timing_measures import (
     Call,
-    keeps_limits,
     measure_call,
     summarize_calls,
     time_quantiles,
@@ -135,14 +134,14 @@ def test_regret_is_against_the_tight_optimum() -> None:
 
 def test_a_plan_that_breaks_a_limit_is_seen() -> None:
     plan = solve_pdg(START, TARGET)
-    assert keeps_limits(plan)
+    assert plan.keeps_limits
     weak = Lander(dry_mass=1150.0, max_thrust=0.9 * 12000.0, specific_impulse=325.0)
-    assert not keeps_limits(replace(plan, problem=problem(weak)))
+    assert not replace(plan, problem=problem(weak)).keeps_limits
     upright = Lander(
         dry_mass=1150.0, max_thrust=12000.0, specific_impulse=325.0, pointing_limit=math.radians(5.0)
     )
-    assert not keeps_limits(replace(plan, problem=problem(upright)))
-    assert not keeps_limits(Plan(PlanStatus.INFEASIBLE, problem(), "convex"))
+    assert not replace(plan, problem=problem(upright)).keeps_limits
+    assert not Plan(PlanStatus.INFEASIBLE, problem(), "convex").keeps_limits
 
 
 def test_rebuilt_cvxpy_compiles_every_time() -> None:
@@ -162,7 +161,7 @@ def test_gfold_flies_the_time_it_is_asked_for() -> None:
     plan = plan_gfold(problem(), 30, exact.time_of_flight)
     assert plan.time_of_flight == pytest.approx(exact.time_of_flight, rel=1e-12)
     assert plan.nodes == 30
-    assert keeps_limits(plan)
+    assert plan.keeps_limits
     assert plan.landing_error < 1e-3
     assert 0.0 < plan.propellant - exact.propellant < 0.1
     free = plan_gfold(problem(), 30)
