@@ -10,6 +10,8 @@ import tyro
 from rich.console import Console
 from rich.table import Table
 
+from guidance import solve_pdg
+from guidance.residuals import fly_residuals
 from guidance.validation import finite_number
 from hda.episode import advance, begin_flight, observe
 from hda.policy import PrivilegedPolicy
@@ -71,13 +73,30 @@ def measure_steps(options: Bench) -> dict[str, np.ndarray]:
     }
 
 
+def measure_plans(options: Bench) -> dict[str, np.ndarray]:
+    """Wall time [s] of a plan to the first target of each episode, and of the flight that checks it."""
+    times: list[tuple[float, float]] = []
+    for episode in range(-1, options.episodes):
+        scenario = sample_scenario(options.preset, 0, max(episode, 0), "tuning")
+        view = scenario.view
+        start = perf_counter()
+        plan = solve_pdg(scenario.initial_state, view.nominal_target, lander=view.lander, gravity=view.gravity)
+        planned = perf_counter()
+        fly_residuals(plan)
+        checked = perf_counter()
+        if episode >= 0:
+            times.append((planned - start, checked - planned))
+    plans, checks = np.array(times).T
+    return {"plan (solve_pdg)": plans, "of which the flight that checks it": checks}
+
+
 def bench(options: Bench) -> None:
     """Measure and print."""
     finite_number("episodes", options.episodes, at_least=1)
     table = Table(title=f"preset {options.preset}, {options.episodes} episodes; one core unless said")
     for column in ("work", "median", "99 %", "unit"):
         table.add_column(column, justify="left" if column == "work" else "right")
-    for name, seconds in measure_steps(options).items():
+    for name, seconds in (measure_steps(options) | measure_plans(options)).items():
         middle, high = 1e6 * np.quantile(seconds, (0.5, 0.99))
         table.add_row(name, f"{middle:.0f}", f"{high:.0f}", "us")
     for wall in measure_terrain(options.repeats):
