@@ -94,7 +94,7 @@ class _Stages:
     def __init__(self, ca: Any, limits: Limits) -> None:
         """State every stage."""
         self._ca, self._limits = ca, limits
-        vectors = dict.fromkeys(("position", "velocity", "gravity"), 3)
+        vectors = dict.fromkeys(("position", "velocity", "target_velocity", "gravity"), 3)
         scalars = ("flow", "least_thrust", "dry", "smoothing", "pointing", "glide", "speed", "low", "high")
         sizes = vectors | dict.fromkeys(scalars, 1)
         self.numbers = {name: ca.SX.sym(name, size) for name, size in sizes.items()}
@@ -120,7 +120,7 @@ class _Stages:
             if self._limits.free_time:
                 self._add(self._ca.vertcat(x[10] - p["low"], p["high"] - x[10]))
         if k == last:
-            self._add(self._ca.vertcat(r, v), 0.0, 0.0)
+            self._add(self._ca.vertcat(r, v - p["target_velocity"]), 0.0, 0.0)
             self._add(z - p["dry"])
         self._state_limits(k)
 
@@ -171,9 +171,9 @@ class _Stages:
 def nonlinear_program(limits: Limits, solver: NonlinearSolver) -> NonlinearProgram:
     """Assemble for a mesh and a set of limits; kept, since every number of a case is a parameter.
 
-    The parameters, scaled: position (3), velocity (3), gravity (3), mass flow, least thrust, ln of the dry
-    mass, smoothing of |u|, cosine of the pointing limit, glide slope limit [rad], speed limit, shortest and
-    longest time of flight.
+    The parameters, scaled: position (3), velocity (3), target velocity (3), gravity (3), mass flow, least
+    thrust, ln of the dry mass, smoothing of |u|, cosine of the pointing limit, glide slope limit [rad], speed
+    limit, shortest and longest time of flight.
     """
     import casadi as ca
 

@@ -34,6 +34,7 @@ def solve_pdg(
     *,
     lander: Lander = PAPER_LANDER,
     gravity: ArrayLike = MOON_GRAVITY,
+    target_velocity: ArrayLike = (0.0, 0.0, 0.0),
     glide_slope_limit: float | None = None,
     speed_limit: float | None = None,
     time_of_flight: float | None = None,
@@ -43,13 +44,15 @@ def solve_pdg(
     guess: Plan | None = None,
     throw: bool = True,
 ) -> Plan:
-    """Plan the descent from `state` to rest on `target` that burns the least propellant.
+    """Plan the descent from `state` to `target` that burns the least propellant.
 
     Args:
         state: State, or seven numbers (x, y, z, vx, vy, vz, mass).
         target: [m] shape (3,), site frame; the trajectory never goes below its altitude.
         lander: the vehicle. Its pointing limit is measured from the z axis.
         gravity: [m/s^2] shape (3,).
+        target_velocity: [m/s] shape (3,), at the target; rest unless given. One that points up is infeasible:
+            it can only be reached from below the target's altitude.
         glide_slope_limit: [rad] greatest angle from the z axis, seen from the landing point, in (0, pi/2].
         speed_limit: [m/s] greatest speed.
         time_of_flight: [s] None searches for the best.
@@ -78,6 +81,7 @@ def solve_pdg(
         finite_vector("gravity", gravity, 3),
         glide_slope_limit,
         speed_limit,
+        finite_vector("target_velocity", target_velocity, 3),
     )
     _check_choices(nodes, method, unreachable, guess)
     if time_of_flight is not None:

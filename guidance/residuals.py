@@ -26,13 +26,14 @@ class Residuals:
         velocity: [m/s] the same for velocity.
         mass: [kg] the same for mass; it holds the relaxation gap, propellant that is planned but not burnt.
         landing_position: [m] flown landing point from the planned one.
-        landing_velocity: [m/s] flown speed at the end.
+        landing_velocity: [m/s] flown velocity at the end from the problem's target velocity.
         thrust_above: [N] greatest excess over max_thrust, at nodes and between.
         thrust_below: [N] greatest lack below min_thrust at nodes (between them a change of direction may
             dip).
         pointing: [rad] greatest excess over the pointing limit at nodes.
         glide_slope: [m] greatest horizontal distance outside the glide slope cone, flown, at nodes.
-        altitude: [m] greatest depth below the target's altitude, flown, at nodes and between.
+        altitude: [m] greatest depth below the target's altitude, or below a start that rounding puts beneath
+            it, flown, at nodes and between.
         speed: [m/s] greatest excess over the speed limit, flown, at nodes.
         propellant: [kg] flown propellant beyond what was on board.
         relaxation_gap: [N] mean planned mass flow times exhaust velocity, minus mean thrust, greatest over
@@ -112,12 +113,12 @@ def fly_residuals(plan: Plan, between: int = 2) -> Residuals:
         velocity=float(velocity_error.max()),
         mass=float(np.abs(flown[:, 6] - plan.mass).max()),
         landing_position=float(position_error[-1]),
-        landing_velocity=float(np.linalg.norm(flown[-1, 3:6])),
+        landing_velocity=float(np.linalg.norm(flown[-1, 3:6] - problem.target_velocity)),
         thrust_above=max(0.0, greatest - lander.max_thrust),
         thrust_below=max(0.0, lander.min_thrust - float(np.linalg.norm(plan.thrust, axis=1).min())),
         pointing=_pointing_excess(plan.thrust, lander.pointing_limit),
         glide_slope=_glide_excess(flown[:, :3] - flown[-1, :3], problem.glide_slope_limit),
-        altitude=max(0.0, float(problem.target[2] - fine[:, 2].min())),
+        altitude=max(0.0, float(min(problem.target[2], fine[0, 2]) - fine[:, 2].min())),
         speed=0.0 if problem.speed_limit is None else max(0.0, speed - problem.speed_limit),
         propellant=max(0.0, lander.dry_mass - float(flown[-1, 6])),
         relaxation_gap=_relaxation_gap(plan),
