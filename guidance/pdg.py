@@ -24,6 +24,8 @@ from guidance.validation import finite_number, finite_vector
 DEFAULT_NODES = 61
 """Nodes of a plan unless asked otherwise: they cost about 5 g of propellant on the paper's descents."""
 FEWEST_NODES = 5
+ARRIVED = "the start is the target, with its velocity: no flight is needed"
+"""Said of a plan with free time of flight: the shorter it is, the better."""
 METHODS = ("convex", "casadi", "cvxpy")
 UNREACHABLE = ("raise", "nearest")
 
@@ -89,6 +91,8 @@ def solve_pdg(
     plan = _plan(problem, nodes, time_of_flight, method, guess)
     if plan.status is not PlanStatus.OPTIMAL:
         plan = _without_flight(plan, nodes, time_of_flight, unreachable)
+    if problem.arrived and time_of_flight is None:
+        plan = replace(plan, message=f"{plan.message}; {ARRIVED}")
     if throw and not plan.status.has_flight:
         raise _error(plan)
     return plan

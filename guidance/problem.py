@@ -108,6 +108,12 @@ class LandingProblem:
         return math.cos(angle) * across - math.sin(angle) * float(vector[2])
 
     @property
+    def arrived(self) -> bool:
+        """Whether the start is the target, with its velocity, to rounding: no flight is needed."""
+        change = float(np.linalg.norm(self.state.velocity - self.target_velocity))
+        return float(np.linalg.norm(self.offset)) <= ROUNDING and change <= self.speed_rounding
+
+    @property
     def speed_rounding(self) -> float:
         """[m/s] a speed that counts as none beside those of the start and of the target."""
         return ROUNDING * max(1.0, self._end_speed)
@@ -119,11 +125,10 @@ class LandingProblem:
     @property
     def speed_bound(self) -> float | None:
         """[m/s] the speed limit, eased where the start or the end exceeds it by no more than rounding."""
-        if self.speed_limit is None or not self.speed_limit < self._end_speed <= self.speed_limit * (
-            1.0 + ROUNDING
-        ):
-            return self.speed_limit
-        return self._end_speed
+        limit, speed = self.speed_limit, self._end_speed
+        if limit is None or not limit < speed <= limit * (1.0 + ROUNDING):
+            return limit
+        return speed
 
     @property
     def log_mass_ratio(self) -> float:

@@ -13,6 +13,7 @@ search over the time of flight (golden section on a grid's best cell) share noth
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
@@ -135,7 +136,9 @@ def _solve_once(problem: LandingProblem, nodes: int, time: float, reference: Arr
     p["glide"].value = math.tan(problem.glide_slope_limit or 0.0)
     p["speed"].value = (problem.speed_bound or 0.0) / units.speed
     try:
-        model.solve(solver=cp.CLARABEL, warm_start=False, ignore_dpp=False)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # of an inaccurate solution, which its status tells
+            model.solve(solver=cp.CLARABEL, warm_start=False, ignore_dpp=False)
     except (KeyboardInterrupt, SystemExit):
         raise
     except BaseException as error:  # SolverError, or a panic of the solver below

@@ -63,9 +63,9 @@ def _fly(plan: Plan, between: int) -> Array:
     return integrate(problem.state, plan.thrust_at, times, problem.lander, problem.gravity)
 
 
-def _pointing_excess(thrust: Array, limit: float | None) -> float:
+def _pointing_excess(thrust: Array, limit: float | None, max_thrust: float) -> float:
     size = np.linalg.norm(thrust, axis=1)
-    burning = size > 1e-3 * max(float(size.max()), 1e-9)
+    burning = size > 1e-3 * max(float(size.max()), 1e-3 * max_thrust)  # what a solver leaves of zero is none
     if limit is None or not burning.any():
         return 0.0
     angle = np.arctan2(np.linalg.norm(thrust[burning, :2], axis=1), thrust[burning, 2])
@@ -116,7 +116,7 @@ def fly_residuals(plan: Plan, between: int = 2) -> Residuals:
         landing_velocity=float(np.linalg.norm(flown[-1, 3:6] - problem.target_velocity)),
         thrust_above=max(0.0, greatest - lander.max_thrust),
         thrust_below=max(0.0, lander.min_thrust - float(np.linalg.norm(plan.thrust, axis=1).min())),
-        pointing=_pointing_excess(plan.thrust, lander.pointing_limit),
+        pointing=_pointing_excess(plan.thrust, lander.pointing_limit, lander.max_thrust),
         glide_slope=_glide_excess(flown[:, :3] - flown[-1, :3], problem.glide_slope_limit),
         altitude=max(0.0, float(min(problem.target[2], fine[0, 2]) - fine[:, 2].min())),
         speed=0.0 if problem.speed_limit is None else max(0.0, speed - problem.speed_limit),
