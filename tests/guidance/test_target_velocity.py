@@ -1,26 +1,23 @@
-"""Plans that end with a velocity: closed forms, three methods, a moving frame, what cannot be reached."""
+"""Plans that end with a velocity: closed forms, three methods, a moving frame, every planner."""
 
-import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from descents import GRAVITY, TARGET, paper_start
-from hypothesis import assume, given, settings
+from descents import GRAVITY, TARGET, arrival_velocity, paper_start
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import guidance
 from guidance import PAPER_LANDER, Lander, PlanStatus, State, propagate
-from guidance.certificate import FarkasProof
 from guidance.deferred_decision import plan_deferred
-from guidance.infeasibility import prove_at
 from guidance.minimum_propellant import ConvexTask
 from guidance.pdg import METHODS
 from guidance.primer_vector import find_primer_flight
 from guidance.problem import LandingProblem
 from guidance.reachability import reachable_set
 from guidance.retarget import shift_landing_point
-from guidance.time_window import forbidden_by, guess_time, time_window
+from guidance.time_window import guess_time, time_window
 from guidance.tracking import make_reference, states_at
 
 START = [180.0, 120.0, 940.0, -7.0, -4.0, -28.0, 1200.0]
@@ -30,12 +27,6 @@ VELOCITY = np.array([4.0, -3.0, -12.0])
 def problem_to(velocity, start=START, lander=PAPER_LANDER, **limits):
     given = {"target_velocity": np.asarray(velocity, float), **limits}
     return LandingProblem(State.parse(start), TARGET, lander, GRAVITY, **given)
-
-
-def draw_velocity(rng, start):
-    """From rest to faster than free fall, any way but up."""
-    fall = math.sqrt(start[5] ** 2 + 2.0 * 1.62 * (start[2] - TARGET[2]))
-    return np.array([*rng.normal(0.0, 0.15, 2) * fall, -rng.uniform(0.0, 1.2) * fall])
 
 
 def check_arrival(plan, velocity):
@@ -54,12 +45,12 @@ def check_arrival(plan, velocity):
 @pytest.mark.parametrize("push", [1.0, -1.0])
 def test_along_the_vertical_it_coasts_and_then_burns_at_full_thrust(push, method):
     """Optimal by Pontryagin's principle, up against the fall and down with it; the burn is Tsiolkovsky's."""
-    burn = 6.0
+    burn = 4.0
     state = State(np.array([0.0, 0.0, 950.0]), np.array([0.0, 0.0, -30.0]), 1200.0)
     lit = propagate(state, [0.0, 0.0, 0.0], 12.0, PAPER_LANDER)
     end = propagate(lit, [0.0, 0.0, push * PAPER_LANDER.max_thrust], burn, PAPER_LANDER)
     plan = guidance.solve_pdg(state, end.position, target_velocity=end.velocity, method=method, nodes=121)
-    assert plan.propellant == pytest.approx(burn * PAPER_LANDER.max_mass_flow, abs=0.03)
+    assert plan.propellant == pytest.approx(burn * PAPER_LANDER.max_mass_flow, abs=0.01)
     assert plan.time_of_flight == pytest.approx(12.0 + burn, abs=0.2)
 
 
@@ -81,7 +72,7 @@ def test_the_velocity_of_free_fall_costs_nothing(climb, method):
 def test_methods_agree_on_dispersed_starts_and_velocities(seed):
     rng = np.random.default_rng(seed)
     start = paper_start(rng)
-    velocity = draw_velocity(rng, start)
+    velocity = arrival_velocity(rng, start)
     plans = [
         guidance.solve_pdg(start, TARGET, target_velocity=velocity, nodes=41, method=method)
         for method in METHODS
@@ -97,7 +88,7 @@ def test_methods_agree_on_dispersed_starts_and_velocities(seed):
 def test_any_start_and_velocity_gives_a_plan_that_flies(seed):
     rng = np.random.default_rng(seed)
     start = paper_start(rng)
-    velocity = draw_velocity(rng, start)
+    velocity = arrival_velocity(rng, start)
     plan = guidance.solve_pdg(start, TARGET, target_velocity=velocity, nodes=41, throw=False)
     if plan.status is PlanStatus.INFEASIBLE:  # too fast sideways for the propellant
         assert plan.certificate is not None
@@ -140,7 +131,7 @@ def test_in_a_frame_that_moves_with_the_velocity_it_is_a_landing_at_rest(seed, s
     ],
     ids=["condensed", "whole", "speed", "engine", "free landing point"],
 )
-@pytest.mark.parametrize("time", [23.0, 27.0, 35.0])
+@pytest.mark.parametrize("time", [27.0, 30.0, 38.0])
 def test_slope_is_the_derivative_of_the_optimum(task, time):
     task, h = replace(task, tolerance=1e-10), 2e-4 * time
     reference = task.solve(time).log_mass
@@ -148,132 +139,6 @@ def test_slope_is_the_derivative_of_the_optimum(task, time):
     difference = (above.value - below.value) / (2.0 * h)
     scale = 1.62 / PAPER_LANDER.exhaust_velocity
     assert middle.slope == pytest.approx(difference, rel=2e-2, abs=2e-3 * scale)
-
-
-def random_flight(rng):
-    """Problem and time of flight of random burns, cut where the flight is at its lowest; None if nowhere."""
-    lander = Lander(max_thrust=rng.uniform(1500.0, 20000.0), specific_impulse=rng.uniform(200.0, 400.0))
-    start = State(rng.uniform(-500.0, 500.0, 3), rng.uniform(-60.0, 60.0, 3), rng.uniform(1155.0, 1400.0))
-    path, times, least = [start], [0.0], lander.max_thrust
-    for _ in range(rng.integers(1, 5)):
-        push = rng.normal(size=3) + np.array([0.0, 0.0, rng.uniform(0.0, 2.0)])
-        throttle, step = rng.uniform(0.0, 1.0) ** 0.3, rng.exponential(4.0) / 20.0
-        thrust = throttle * lander.max_thrust * push / np.linalg.norm(push)
-        least = min(least, throttle * lander.max_thrust)
-        for _ in range(20):
-            path.append(propagate(path[-1], thrust, step, lander, GRAVITY))
-            times.append(times[-1] + step)
-    height = np.array([state.position[2] for state in path])
-    lowest = [
-        k
-        for k in range(1, len(path))
-        if path[k].velocity[2] <= 0.0 and height[k] < height[:k].min() and path[k].mass > lander.dry_mass
-    ]
-    if not lowest:
-        return None
-    k = rng.choice(lowest)
-    speed = max(float(np.linalg.norm(state.velocity)) for state in path[: k + 1])
-    fields = {"speed_limit": speed, "target_velocity": path[k].velocity}
-    engine = replace(lander, min_thrust=least)
-    return LandingProblem(start, path[k].position, engine, GRAVITY, None, **fields), times[k]
-
-
-@settings(max_examples=400)
-@given(seed=st.integers(0, 1_000_000))
-def test_no_flight_is_excluded_by_the_closed_form_bounds(seed):
-    flight = random_flight(np.random.default_rng(seed))
-    assume(flight is not None)
-    problem, time = flight
-    for free in (False, True):
-        window = time_window(problem, free)
-        assert not window.empty, window.cause
-        assert window.low <= time <= window.high * (1.0 + 1e-9)
-        assert not forbidden_by(problem, time, free)
-    assert window.low <= guess_time(problem, window) <= window.high
-
-
-@pytest.mark.parametrize("seed", range(10))
-def test_a_feasible_time_is_not_disproved_and_one_out_of_reach_is(seed):
-    rng = np.random.default_rng(seed)
-    start = paper_start(rng)
-    problem = problem_to(draw_velocity(rng, start), start)
-    plan = guidance.solve_pdg(start, TARGET, target_velocity=problem.target_velocity, nodes=31, throw=False)
-    assert plan.status.has_flight == (plan.certificate is None)
-    task = ConvexTask(problem, 31)
-    if plan.status.has_flight:
-        assert not isinstance(prove_at(task, 1.005 * plan.time_of_flight), FarkasProof)
-    assert isinstance(prove_at(task, 4.0), FarkasProof)
-    assert isinstance(prove_at(task, 90.0), FarkasProof)
-
-
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("time_of_flight", [None, 27.0])
-@pytest.mark.parametrize("unreachable", ["raise", "nearest"])
-@pytest.mark.parametrize(
-    ("velocity", "limits", "cause"),
-    [
-        ((0.0, 0.0, 0.1), {}, "altitude"),
-        ((3.0, 0.0, 8.0), {"speed_limit": 100.0}, "altitude"),
-        ((0.0, 0.0, -41.0), {"speed_limit": 40.0}, "speed"),
-        ((9.0, 0.0, -3.0), {"glide_slope_limit": 0.9}, "glide slope"),
-    ],
-)
-def test_what_the_velocity_itself_forbids_is_told_without_a_solve(
-    velocity, limits, cause, unreachable, time_of_flight, method
-):
-    plan = guidance.solve_pdg(
-        START,
-        TARGET,
-        target_velocity=velocity,
-        method=method,
-        time_of_flight=time_of_flight,
-        unreachable=unreachable,
-        throw=False,
-        **limits,
-    )
-    assert plan.status is PlanStatus.INFEASIBLE
-    assert plan.certificate is not None
-    assert plan.certificate.causes == (cause,)
-    assert not plan.certificate.proofs
-    assert cause in plan.message
-
-
-@pytest.mark.parametrize(
-    ("start", "velocity", "feasible"),
-    [
-        ([0, 0, 110, 0, 0, -60, 1200], -40.0, False),  # full thrust leaves 50 m/s at the target
-        ([0, 0, 110, 0, 0, -60, 1200], -52.0, True),
-        ([0, 0, 50, 0, 0, -5, 1200], -15.0, False),  # on the ground, sinking: below it at once
-        ([0, 0, 50, 0, 0, 5, 1200], -5.0, True),
-    ],
-)
-@pytest.mark.parametrize("time_of_flight", [None, 20.0])
-def test_a_start_too_fast_to_stop_may_only_arrive_fast_and_soon(start, velocity, feasible, time_of_flight):
-    feasible = feasible and (time_of_flight is None or start[5] > 0.0)
-    plan = guidance.solve_pdg(
-        start, TARGET, target_velocity=(0, 0, velocity), time_of_flight=time_of_flight, nodes=21, throw=False
-    )
-    assert plan.status is (PlanStatus.OPTIMAL if feasible else PlanStatus.INFEASIBLE)
-    if not feasible:
-        assert plan.certificate is not None
-        assert plan.certificate.causes == ("altitude",)
-
-
-def test_the_slowest_arrival_of_a_start_too_fast_to_stop_is_found_on_the_edge():
-    """60 m at 60 m/s: with the mass of the start full thrust leaves sqrt(60^2 - 2 60 (10 - 1.62)) m/s."""
-    burnt = propagate(
-        State(np.array([0.0, 0.0, 110.0]), np.array([0.0, 0.0, -60.0]), 1200.0),
-        [0.0, 0.0, PAPER_LANDER.max_thrust],
-        1.0822,
-        PAPER_LANDER,
-    )
-    assert burnt.position[2] == pytest.approx(50.0, abs=0.2)
-    arrival = burnt.velocity[2]
-    for change, status in ((-0.3, PlanStatus.OPTIMAL), (0.3, PlanStatus.INFEASIBLE)):
-        plan = guidance.solve_pdg(
-            [0, 0, 110, 0, 0, -60, 1200], TARGET, target_velocity=(0, 0, arrival + change), throw=False
-        )
-        assert plan.status is status
 
 
 def test_nearest_arrives_with_the_velocity_as_near_as_it_can():
