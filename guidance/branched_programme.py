@@ -74,7 +74,7 @@ class Branching:
             for family in self.constraint_set.families:
                 part = family(self.layout, shared)
                 if family is constraints.landing:
-                    part = replace(part, bound=np.concatenate([aim, np.zeros(3)]))
+                    part = replace(part, bound=np.concatenate([aim, numbers.target_velocity]))
                 moved = self._moved(part, branch)
                 if moved is not None:
                     parts.append(moved)

@@ -86,11 +86,12 @@ def _moment_entries(layout: CondensedLayout) -> tuple[Index, Index, Array]:
 
 
 def landing_moments(layout: CondensedLayout, scaled: ScaledProblem) -> Rows:
-    """At rest on the target at the end."""
+    """The end: on the target, at its velocity."""
     row, column, value = _moment_entries(layout)
     r, v, g = scaled.position, scaled.velocity, scaled.gravity
-    bound = np.concatenate([-r - v - 0.5 * g, -v - g])
-    rate = np.concatenate([2.0 * r + v, v])
+    change = v - scaled.target_velocity
+    bound = np.concatenate([-r - v - 0.5 * g, -change - g])
+    rate = np.concatenate([2.0 * r + v, change])
     return Rows("landing", "zero", 6, row, column, value, bound, bound_rate=rate)
 
 

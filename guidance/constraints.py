@@ -114,11 +114,13 @@ def motion(layout: Layout, scaled: ScaledProblem) -> Rows:
 
 
 def landing(layout: Layout, scaled: ScaledProblem) -> Rows:
-    """At rest at the last node, on the target or, where the landing point is free, in the target's plane."""
+    """The last node: on the target, or in its plane where the landing point is free, at its velocity."""
     position = layout.position[-1]
     column = np.concatenate([position[2:] if layout.free_landing_point else position, layout.velocity[-1]])
     size = column.size
-    return Rows("landing", "zero", size, np.arange(size), column, np.ones(size), np.zeros(size))
+    bound = np.zeros(size)
+    bound[-3:] = scaled.target_velocity
+    return Rows("landing", "zero", size, np.arange(size), column, np.ones(size), bound, bound_rate=-bound)
 
 
 def thrust_cone(layout: Layout, scaled: ScaledProblem) -> Rows:

@@ -27,7 +27,7 @@ from guidance.state import State
 Array = NDArray[np.float64]
 
 _CONSTANT_FAMILIES: frozenset[Family] = frozenset(
-    {burnt_mass, constraints.landing, constraints.altitude_floor, constraints.thrust_cone}
+    {burnt_mass, constraints.altitude_floor, constraints.thrust_cone}
 )
 
 
@@ -205,6 +205,7 @@ def nominal_numbers(nodes: int) -> ScaledProblem:
         np.array(MOON_GRAVITY),
         glide_slope_limit=1.0,
         speed_limit=100.0,
+        target_velocity=np.array([2.0, 1.0, -5.0]),
     )
     return scale_problem(problem, 30.0, nodes)
 

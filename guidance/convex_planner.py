@@ -18,6 +18,7 @@ from guidance.minimum_propellant import (
 )
 from guidance.plan import Plan, PlanStatus
 from guidance.problem import LandingProblem
+from guidance.time_window import forbidden_by
 from guidance.trajectory_guess import swing_sideways
 
 METHOD = "convex"
@@ -49,6 +50,9 @@ def plan_convex(
     """
     task = ConvexTask(problem, nodes)
     if time_of_flight is not None:
+        cause = forbidden_by(problem, time_of_flight)
+        if cause:
+            return Plan(PlanStatus.INFEASIBLE, problem, METHOD, message=cause)
         solution, solves = task.solve(time_of_flight), 1
     else:
         tolerance = SHARE_TOLERANCE if guess_time is None else _REPLAN_TOLERANCE
@@ -157,6 +161,9 @@ def plan_nearest(problem: LandingProblem, nodes: int, time_of_flight: float | No
     anywhere = ConvexTask(problem, nodes, free_landing_point=True)
     nearest = replace(anywhere, least_error=True, limit_propellant=True)
     if time_of_flight is not None:
+        cause = forbidden_by(problem, time_of_flight, free_landing_point=True)
+        if cause:
+            return Plan(PlanStatus.INFEASIBLE, problem, METHOD, message=cause)
         least = nearest.solve(time_of_flight)
         solves = 1
     else:

@@ -25,6 +25,7 @@ from guidance.minimum_propellant import ConvexTask, bounds_hold
 from guidance.plan import Plan, PlanStatus
 from guidance.problem import LandingProblem
 from guidance.scaling import scale_problem
+from guidance.time_window import forbidden_by
 from guidance.validation import finite_number, finite_vector
 
 Array = NDArray[np.float64]
@@ -132,7 +133,11 @@ def plan_deferred(
     chances = np.maximum(chances / chances.sum(), _LEAST_WEIGHT)
     problems = [replace(problem, target=site) for site in sites]
     alone, solves = _cheapest_alone(problems, time_of_flight, nodes)
-    missing = tuple(k for k, solution in enumerate(alone) if not solution.solved)
+    missing = tuple(
+        k
+        for k, (own, solution) in enumerate(zip(problems, alone, strict=True))
+        if not solution.solved or forbidden_by(own, time_of_flight)
+    )
     if missing:
         return DeferredDecision((), 0, missing, solves)
     extra = -np.log1p(-budget / problem.state.mass)

@@ -11,7 +11,7 @@ from guidance.constraint_set import ConstraintSet
 from guidance.convex import ConvexSolution, convex_template
 from guidance.minimum_propellant import ConvexTask
 from guidance.scaling import scale_problem
-from guidance.time_window import TimeWindow, time_window
+from guidance.time_window import TimeWindow, forbidden_by, time_window
 
 
 def prove_at(task: ConvexTask, time: float) -> FarkasProof | ConvexSolution:
@@ -51,6 +51,9 @@ def prove_fixed_time(task: ConvexTask, time: float) -> Certificate | None:
     window = time_window(task.problem, task.free_landing_point)
     if window.empty:
         return _closed_form(window)
+    cause = forbidden_by(task.problem, time, task.free_landing_point)
+    if cause:
+        return Certificate(f"time of flight {time:g} s, on any mesh: closed-form bound on {cause}", (cause,))
     proof = prove_at(task, time)
     if not isinstance(proof, FarkasProof):
         return None

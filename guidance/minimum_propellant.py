@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from guidance.bracket_search import BracketSearch
 from guidance.clarabel_solver import SolveStatus
 from guidance.condensed import keeps_altitude
 from guidance.constraint_set import ConstraintSet
@@ -26,14 +27,8 @@ _DIP = FLIGHT_TOLERANCE.thrust_dip
 _COARSE_NODES = 13
 _NEAR_DEAD_TIME = 0.97  # first steps are small where the guess is good
 _MOST_REFINEMENTS = 8
-_STEPS_FROM_EDGE = (
-    1e-3,
-    3e-3,
-    1e-2,
-    3e-2,
-    0.1,
-    0.3,
-)  # relative changes of a time that the true bounds refuse
+_STEPS_FROM_EDGE = (1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3)  # changes of a time that the true bounds refuse
+_COARSE_TOLERANCE = 20.0  # of a bracket's search on the coarse mesh: J has kinks where burns meet its nodes
 SHARE_TOLERANCE = 4e-6
 """Gain in ln(mass) below which the time search stops: 5 g of propellant at 1200 kg."""
 
@@ -127,7 +122,7 @@ def relaxation_tight(problem: LandingProblem, solution: ConvexSolution) -> bool:
         return False
     if ratio > 0.0 and (_least_between(push) * np.exp(solution.log_mass[1:])).min() < ratio * (1.0 - _DIP):
         return False
-    return pointing_excess(push, limit) <= FLIGHT_TOLERANCE.pointing
+    return pointing_excess(push, limit, 1.0) <= FLIGHT_TOLERANCE.pointing
 
 
 def _least_between(push: Array) -> Array:
@@ -191,9 +186,12 @@ def minimise_over_time(
     start = guess_time(task.problem, window) if guess is None else guess
     start = min(max(start, window.low), window.high)
     solves = 0
+    kind, share = (
+        (BracketSearch, _COARSE_TOLERANCE) if task.problem.target_velocity.any() else (TimeSearch, 2.0)
+    )
     if coarse_first and task.nodes > 1.5 * _COARSE_NODES:
         coarse = replace(task, nodes=_COARSE_NODES, tolerance=1e-6)
-        search = TimeSearch(coarse.solve, window, 2.0 * tolerance, model)
+        search = kind(coarse.solve, window, share * tolerance, model)
         found = search.run(start)
         solves = len(search.samples)
         if found is not None:
@@ -202,7 +200,7 @@ def minimise_over_time(
                 refined, more = coarse.refine(found)
                 solves += more
                 reference = refined.log_mass if refined.solved else None
-    search = TimeSearch(_evaluation(task, reference), window, tolerance, model)
+    search = kind(_evaluation(task, reference), window, tolerance, model)
     return TimeOutcome(search.run(start), solves + len(search.samples))
 
 

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from guidance.problem import LandingProblem
 
 NonlinearSolver = Literal["fatrop", "ipopt"]
+_GREATEST_TURN = math.cos(math.radians(45.0))  # in one interval, for an engine that cannot stop
 _GLIDE_SMOOTHING = 1e-6  # of the unit of length
 _MOST_ITERATIONS: dict[NonlinearSolver, int] = {"fatrop": 200, "ipopt": 500}
 
@@ -94,7 +95,7 @@ class _Stages:
     def __init__(self, ca: Any, limits: Limits) -> None:
         """State every stage."""
         self._ca, self._limits = ca, limits
-        vectors = dict.fromkeys(("position", "velocity", "gravity"), 3)
+        vectors = dict.fromkeys(("position", "velocity", "target_velocity", "gravity"), 3)
         scalars = ("flow", "least_thrust", "least_midway", "dry", "smoothing", "pointing", "glide", "speed")
         scalars += ("low", "high")
         sizes = vectors | dict.fromkeys(scalars, 1)
@@ -121,7 +122,7 @@ class _Stages:
             if self._limits.free_time:
                 self._add(self._ca.vertcat(x[10] - p["low"], p["high"] - x[10]))
         if k == last:
-            self._add(self._ca.vertcat(r, v), 0.0, 0.0)
+            self._add(self._ca.vertcat(r, v - p["target_velocity"]), 0.0, 0.0)
             self._add(z - p["dry"])
         self._state_limits(k)
 
@@ -139,6 +140,8 @@ class _Stages:
             there.append(time)
         self._add(self.states[k + 1] - ca.vertcat(*there), 0.0, 0.0)
         self._add(ca.exp(z - 0.5 * burnt) * middle - p["least_midway"])
+        if self._limits.min_thrust:  # midway alone lets a strong thrust turn round into a weak one
+            self._add(ca.dot(u, w) - _GREATEST_TURN * self._size(u) * self._size(w))
 
     def _state_limits(self, k: int) -> None:
         x, p, ca, last = self.states[k], self.numbers, self._ca, self._limits.nodes - 1
@@ -172,9 +175,9 @@ class _Stages:
 def nonlinear_program(limits: Limits, solver: NonlinearSolver) -> NonlinearProgram:
     """Assemble for a mesh and a set of limits; kept, since every number of a case is a parameter.
 
-    The parameters, scaled: position (3), velocity (3), gravity (3), mass flow, least thrust at nodes and
-    midway between, ln of the dry mass, smoothing of |u|, cosine of the pointing limit, glide slope limit
-    [rad], speed limit, shortest and longest time of flight.
+    The parameters, scaled: position (3), velocity (3), target velocity (3), gravity (3), mass flow, least
+    thrust at nodes and midway between, ln of the dry mass, smoothing of |u|, cosine of the pointing limit,
+    glide slope limit [rad], speed limit, shortest and longest time of flight.
     """
     import casadi as ca
 

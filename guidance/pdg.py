@@ -28,6 +28,8 @@ FEWEST_NODES = 5
 MOST_NODES = 1000
 """A plan that does not keep its limits on so many nodes is none."""
 _CURED_BY_NODES = ("position", "velocity", "altitude", "glide_slope", "speed", "thrust_above", "thrust_dip")
+ARRIVED = "the start is the target, with its velocity: no flight is needed"
+"""Said of a plan with free time of flight: the shorter it is, the better."""
 METHODS = ("convex", "casadi", "cvxpy")
 UNREACHABLE = ("raise", "nearest")
 
@@ -38,6 +40,7 @@ def solve_pdg(
     *,
     lander: Lander = PAPER_LANDER,
     gravity: ArrayLike = MOON_GRAVITY,
+    target_velocity: ArrayLike = (0.0, 0.0, 0.0),
     glide_slope_limit: float | None = None,
     speed_limit: float | None = None,
     time_of_flight: float | None = None,
@@ -47,13 +50,15 @@ def solve_pdg(
     guess: Plan | None = None,
     throw: bool = True,
 ) -> Plan:
-    """Plan the descent from `state` to rest on `target` that burns the least propellant.
+    """Plan the descent from `state` to `target` that burns the least propellant.
 
     Args:
         state: State, or seven numbers (x, y, z, vx, vy, vz, mass).
         target: [m] shape (3,), site frame; the trajectory never goes below its altitude.
         lander: the vehicle. Its pointing limit is measured from the z axis.
         gravity: [m/s^2] shape (3,).
+        target_velocity: [m/s] shape (3,), at the target; rest unless given. One that points up is infeasible:
+            it can only be reached from below the target's altitude.
         glide_slope_limit: [rad] greatest angle from the z axis, seen from the landing point, in (0, pi/2].
         speed_limit: [m/s] greatest speed.
         time_of_flight: [s] None searches for the best.
@@ -83,6 +88,7 @@ def solve_pdg(
         finite_vector("gravity", gravity, 3),
         glide_slope_limit,
         speed_limit,
+        finite_vector("target_velocity", target_velocity, 3),
     )
     _check_choices(nodes, method, unreachable, guess)
     if time_of_flight is not None:
@@ -92,6 +98,8 @@ def solve_pdg(
         plan = _within_limits(plan, lambda finer, found: _plan(problem, finer, time_of_flight, method, found))
     else:
         plan = _without_flight(plan, nodes, time_of_flight, unreachable)
+    if problem.arrived and time_of_flight is None:
+        plan = replace(plan, message=f"{plan.message}; {ARRIVED}")
     if throw and not plan.status.has_flight:
         raise _error(plan)
     return plan

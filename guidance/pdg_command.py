@@ -22,6 +22,7 @@ class PdgCommand:
     Attributes:
         state: Start: x y z [m], vx vy vz [m/s], mass [kg]; x east, y north, z up.
         target: Landing point x y z [m].
+        target_velocity: Velocity x y z at the landing point [m/s].
         dry_mass: Mass with an empty tank [kg].
         max_thrust: Greatest thrust [N].
         min_thrust: Least thrust [N].
@@ -40,6 +41,7 @@ class PdgCommand:
 
     state: tuple[float, float, float, float, float, float, float]
     target: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    target_velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
     dry_mass: float = 1150.0
     max_thrust: float = 12000.0
     min_thrust: float = 0.0
@@ -75,6 +77,7 @@ class PdgCommand:
             nodes=self.nodes,
             method=self.method,
             unreachable=self.unreachable,
+            target_velocity=self.target_velocity,
         )
 
 

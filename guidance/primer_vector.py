@@ -60,11 +60,11 @@ def find_primer_flight(problem: LandingProblem) -> PrimerFlight | None:
 
     Returns:
         The flight; None where none was found, where the engine cannot stop or cannot lift the vehicle, where
-        gravity vanishes, where no coast is left between the burns, or where the flight breaks a limit of the
-        problem: the method knows none.
+        the flight does not end at rest, where gravity vanishes, where no coast is left between the burns, or
+        where the flight breaks a limit of the problem: the method knows none.
     """
     lander, mass = problem.lander, problem.state.mass
-    if lander.min_thrust > 0.0:
+    if lander.min_thrust > 0.0 or problem.target_velocity.any():
         return None
     push = lander.max_thrust / mass
     case, x = np.empty(10), np.empty(9)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,11 +14,21 @@ from guidance.validation import finite_number, finite_vector
 
 LARGEST_NUMBER = 1e9
 """No distance, speed or mass of a powered descent is larger; far beyond it, their powers overflow."""
+ROUNDING = 1e-6
+"""What rounding may take from a limit: of the distance to the target or 1 m, of the speed or 1 m/s."""
+
+
+def lies_below(start: NDArray[np.float64], target: NDArray[np.float64]) -> bool:
+    """Whether a start [m] lies below a target's altitude by more than rounding; both of shape (3,)."""
+    depth = float(target[2] - start[2])
+    return depth > 0.0 and depth > ROUNDING * max(1.0, float(np.linalg.norm(start - target)))
 
 
 @dataclass(frozen=True, eq=False)
 class LandingProblem:
-    """From `state` to rest on `target` with the least propellant, never below the target's altitude.
+    """From `state` to `target` with the least propellant, never below the target's altitude.
+
+    A start that breaks the altitude, the glide slope or the speed limit by no more than `ROUNDING` keeps it.
 
     Attributes:
         state: where the flight starts; its mass includes the propellant.
@@ -28,10 +38,11 @@ class LandingProblem:
         glide_slope_limit: [rad] greatest angle, seen from the landing point, between the vehicle and the z
             axis, in (0, pi/2]; None for none.
         speed_limit: [m/s] greatest speed; None for none.
+        target_velocity: [m/s] shape (3,), at the target; rest unless given.
 
     Raises:
-        ValueError: an argument is out of range or not finite, the start lies below the target's altitude,
-            its mass does not exceed the dry mass, or a number is beyond 1e9.
+        ValueError: an argument is out of range or not finite, the start lies below the target's altitude by
+            more than rounding, its mass does not exceed the dry mass, or a number is beyond 1e9.
     """
 
     state: State
@@ -40,24 +51,25 @@ class LandingProblem:
     gravity: NDArray[np.float64]
     glide_slope_limit: float | None = None
     speed_limit: float | None = None
+    target_velocity: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
 
     def __post_init__(self) -> None:
         """Refuse what no solver should see."""
-        for name in ("target", "gravity"):
+        for name in ("target", "gravity", "target_velocity"):
             vector = finite_vector(name, getattr(self, name), 3)
             vector.flags.writeable = False
             object.__setattr__(self, name, vector)
         if not isinstance(self.lander, Lander):
             raise ValueError(f"lander must be a Lander, got {self.lander!r}")
-        numbers = (("state", self.state.as_array()), ("target", self.target), ("gravity", self.gravity))
-        for name, vector in numbers:
+        numbers = {name: getattr(self, name) for name in ("target", "gravity", "target_velocity")}
+        for name, vector in ({"state": self.state.as_array()} | numbers).items():
             if np.abs(vector).max() > LARGEST_NUMBER:
                 raise ValueError(f"{name}: no number may exceed {LARGEST_NUMBER:g}, got {vector.tolist()}")
         if self.state.mass <= self.lander.dry_mass:
             raise ValueError(
                 f"state: mass {self.state.mass:g} kg must exceed the dry mass {self.lander.dry_mass:g} kg"
             )
-        if self.state.position[2] < self.target[2]:
+        if lies_below(self.state.position, self.target):
             raise ValueError(
                 f"state: start altitude {self.state.position[2]:g} m lies below the target's, "
                 f"{self.target[2]:g} m"
@@ -74,8 +86,49 @@ class LandingProblem:
 
     @property
     def offset(self) -> NDArray[np.float64]:
-        """[m] shape (3,): the start as seen from the target."""
-        return self.state.position - self.target
+        """[m] shape (3,): the start as seen from the target.
+
+        One that breaks the altitude or the glide slope by no more than rounding is moved to keep it.
+        """
+        offset = self.state.position - self.target
+        if offset[2] < 0.0:
+            offset[2] = 0.0
+        outside = self.outside_glide_slope(offset)
+        if 0.0 < outside <= ROUNDING * max(1.0, float(np.linalg.norm(offset))):
+            across, angle = math.hypot(offset[0], offset[1]), self.glide_slope_limit or 0.0
+            offset[:2] *= 1.0 - outside * math.cos(angle) / across
+            offset[2] += outside * math.sin(angle)
+        return offset
+
+    def outside_glide_slope(self, vector: NDArray[np.float64]) -> float:
+        """How far a vector from the landing point, shape (3,), lies outside the glide slope; inside: <= 0."""
+        if self.glide_slope_limit is None or not self.has_glide_slope:
+            return 0.0
+        angle, across = self.glide_slope_limit, math.hypot(vector[0], vector[1])
+        return math.cos(angle) * across - math.sin(angle) * float(vector[2])
+
+    @property
+    def arrived(self) -> bool:
+        """Whether the start is the target, with its velocity, to rounding: no flight is needed."""
+        change = float(np.linalg.norm(self.state.velocity - self.target_velocity))
+        return float(np.linalg.norm(self.offset)) <= ROUNDING and change <= self.speed_rounding
+
+    @property
+    def speed_rounding(self) -> float:
+        """[m/s] a speed that counts as none beside those of the start and of the target."""
+        return ROUNDING * max(1.0, self._end_speed)
+
+    @property
+    def _end_speed(self) -> float:
+        return max(float(np.linalg.norm(self.state.velocity)), float(np.linalg.norm(self.target_velocity)))
+
+    @property
+    def speed_bound(self) -> float | None:
+        """[m/s] the speed limit, eased where the start or the end exceeds it by no more than rounding."""
+        limit, speed = self.speed_limit, self._end_speed
+        if limit is None or not limit < speed <= limit * (1.0 + ROUNDING):
+            return limit
+        return speed
 
     @property
     def log_mass_ratio(self) -> float:

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from guidance.minimum_propellant import ConvexTask, minimise_over_time
 from guidance.problem import LandingProblem
+from guidance.time_window import forbidden_by
 from guidance.validation import finite_number
 
 Array = NDArray[np.float64]
@@ -106,6 +107,8 @@ def _slice_at(problem: LandingProblem, time: float, directions: int, nodes: int)
     """Project far points from all around; None where fewer than three come back."""
     from scipy.spatial import ConvexHull, QhullError
 
+    if forbidden_by(problem, time, free_landing_point=True):
+        return None
     state = problem.state
     far = _FAR * problem.lander.max_thrust / state.mass * time**2
     middle = state.position[:2] + 0.5 * time * state.velocity[:2]

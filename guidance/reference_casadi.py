@@ -23,7 +23,7 @@ from guidance.nonlinear_program import Limits, NonlinearSolver, nonlinear_progra
 from guidance.plan import Plan, PlanStatus
 from guidance.problem import LandingProblem
 from guidance.reference_units import Units
-from guidance.time_window import guess_time, time_window
+from guidance.time_window import forbidden_by, guess_time, time_window
 from guidance.trajectory_guess import is_vertical, least_energy_flight, rest_of_flight, swing_sideways
 
 METHOD = "casadi"
@@ -43,6 +43,7 @@ def _parameters(problem: LandingProblem, units: Units, ends: tuple[float, float]
         [
             problem.offset / units.length,
             problem.state.velocity / units.speed,
+            problem.target_velocity / units.speed,
             problem.gravity / units.acceleration,
             [
                 units.speed / lander.exhaust_velocity,
@@ -51,7 +52,7 @@ def _parameters(problem: LandingProblem, units: Units, ends: tuple[float, float]
             ],
             [-problem.log_mass_ratio, 1e-8 if lander.min_thrust > 0.0 else smoothing],
             [math.cos(lander.pointing_limit or math.pi)],
-            [problem.glide_slope_limit or 0.0, (problem.speed_limit or 0.0) / units.speed],
+            [problem.glide_slope_limit or 0.0, (problem.speed_bound or 0.0) / units.speed],
             np.array(ends) / units.time,
         ]
     )
@@ -107,12 +108,13 @@ def plan_casadi(
 
     Returns:
         A plan that is OPTIMAL (a local optimum); or LIMIT_REACHED or SOLVER_FAILED, without a flight;
-        INFEASIBLE only where closed-form bounds leave no time of flight. Its message names the solver, and
-        what fatrop said where IPOPT took over; both count as solves.
+        INFEASIBLE only where closed-form bounds leave no time of flight, or not the one asked for. Its
+        message names the solver, and what fatrop said where IPOPT took over; both count as solves.
     """
     window = time_window(problem)
-    if window.empty and time_of_flight is None:
-        return Plan(PlanStatus.INFEASIBLE, problem, METHOD, message=window.cause)
+    cause = window.cause if time_of_flight is None else forbidden_by(problem, time_of_flight)
+    if cause:
+        return Plan(PlanStatus.INFEASIBLE, problem, METHOD, message=cause)
     limits = Limits.of(problem, nodes, time_of_flight is None)
     if guess is not None and guess.nodes:
         start = rest_of_flight(problem, guess, nodes)

@@ -4,7 +4,7 @@
     subject to  r' = v,  v' = u + g,  z' = -s / c        u, s linear between nodes (first-order hold)
                 |u| <= s,   T_min/m <= s <= T_max/m      (the last two linearised in z about a reference)
                 r_z >= 0,   u_z >= s cos(pointing),  |r_xy| <= r_z tan(glide slope),  |v| <= speed limit
-                r(T) = v(T) = 0
+                r(T) = 0,  v(T) = v_f
 
 Its units (fixed by the start, not by the time of flight), its linearisation (tangents, repeated) and its
 search over the time of flight (golden section on a grid's best cell) share nothing with the fast solver.
@@ -13,6 +13,7 @@ search over the time of flight (golden section on a grid's best cell) share noth
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
@@ -23,7 +24,7 @@ from numpy.typing import NDArray
 from guidance.plan import Plan, PlanStatus
 from guidance.problem import LandingProblem
 from guidance.reference_units import Units
-from guidance.time_window import time_window
+from guidance.time_window import forbidden_by, time_window
 
 METHOD = "cvxpy"
 _LINEARISATIONS = 6
@@ -44,6 +45,7 @@ def _model(nodes: int, limits: tuple[bool, bool, bool, bool]) -> tuple[Any, dict
     p = {
         "r0": cp.Parameter(3),
         "v0": cp.Parameter(3),
+        "vf": cp.Parameter(3),
         "dt": cp.Parameter(nonneg=True),
         "dt2": cp.Parameter(nonneg=True),
         "g_dt": cp.Parameter(3),
@@ -63,7 +65,7 @@ def _model(nodes: int, limits: tuple[bool, bool, bool, bool]) -> tuple[Any, dict
         v[0] == p["v0"],
         z[0] == 0,
         r[-1] == 0,
-        v[-1] == 0,
+        v[-1] == p["vf"],
         r[1:] == r[:-1] + p["dt"] * v[:-1] + p["dt2"] * (u[:-1] / 3 + u[1:] / 6) + ones @ fall / 2,
         v[1:] == v[:-1] + p["dt"] * (u[:-1] + u[1:]) / 2 + ones @ pull,
         z[1:] == z[:-1] - p["burn"] * (s[:-1] + s[1:]),
@@ -124,6 +126,7 @@ def _solve_once(problem: LandingProblem, nodes: int, time: float, reference: Arr
     dt = time / (nodes - 1) / units.time
     gravity = problem.gravity / units.acceleration
     p["r0"].value, p["v0"].value = problem.offset / units.length, problem.state.velocity / units.speed
+    p["vf"].value = problem.target_velocity / units.speed
     p["dt"].value, p["dt2"].value = dt, dt**2
     p["g_dt"].value, p["g_dt2"].value = gravity * dt, gravity * dt**2
     p["burn"].value = 0.5 * dt * units.speed / problem.lander.exhaust_velocity
@@ -131,9 +134,11 @@ def _solve_once(problem: LandingProblem, nodes: int, time: float, reference: Arr
     p["ratio"].value = problem.lander.min_thrust / problem.lander.max_thrust
     p["pointing"].value = math.cos(problem.lander.pointing_limit or math.pi)
     p["glide"].value = math.tan(problem.glide_slope_limit or 0.0)
-    p["speed"].value = (problem.speed_limit or 0.0) / units.speed
+    p["speed"].value = (problem.speed_bound or 0.0) / units.speed
     try:
-        model.solve(solver=cp.CLARABEL, warm_start=False, ignore_dpp=False)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # of an inaccurate solution, which its status tells
+            model.solve(solver=cp.CLARABEL, warm_start=False, ignore_dpp=False)
     except (KeyboardInterrupt, SystemExit):
         raise
     except BaseException as error:  # SolverError, or a panic of the solver below
@@ -205,6 +210,8 @@ def plan_cvxpy(problem: LandingProblem, nodes: int, time_of_flight: float | None
     """
     if time_of_flight is None:
         flight = _solve_best_time(problem, nodes)
+    elif cause := forbidden_by(problem, time_of_flight):
+        return Plan(PlanStatus.INFEASIBLE, problem, METHOD, message=cause)
     else:
         flight = _solve_time(problem, nodes, time_of_flight)
     if flight.log_mass.size and flight.share <= problem.log_mass_ratio + 1e-7:

@@ -1,4 +1,4 @@
-"""Units of the reference solvers: set by the start alone, unlike those of the fast solver."""
+"""Units of the reference solvers: set by the ends of the flight, unlike those of the fast solver."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Units:
     def of(cls, problem: LandingProblem) -> Units:
         """Units in which start and thrust are of size one."""
         acceleration = problem.lander.max_thrust / problem.state.mass
-        speed = float(np.linalg.norm(problem.state.velocity))
+        speed = max(float(np.linalg.norm(v)) for v in (problem.state.velocity, problem.target_velocity))
         length = max(float(np.linalg.norm(problem.offset)), speed**2 / acceleration, 1e-3)
         return cls(length, acceleration)
 

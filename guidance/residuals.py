@@ -79,13 +79,14 @@ class Residuals:
         velocity: [m/s] the same for velocity.
         mass: [kg] the same for mass; it holds the relaxation gap, propellant that is planned but not burnt.
         landing_position: [m] flown landing point from the planned one.
-        landing_velocity: [m/s] flown speed at the end.
+        landing_velocity: [m/s] flown velocity at the end from the problem's target velocity.
         thrust_above: [N] greatest excess over max_thrust, at nodes and between.
         thrust_below: [N] greatest lack below min_thrust at nodes.
         thrust_dip: [N] the same between nodes, where a change of direction makes the thrust dip.
         pointing: [rad] greatest excess over the pointing limit at nodes.
         glide_slope: [m] greatest horizontal distance outside the glide slope cone, flown, at nodes.
-        altitude: [m] greatest depth below the target's altitude, flown, at nodes and between.
+        altitude: [m] greatest depth below the target's altitude, or below a start that rounding puts beneath
+            it, flown, at nodes and between.
         speed: [m/s] greatest excess over the speed limit, flown, at nodes.
         propellant: [kg] flown propellant beyond what was on board.
         relaxation_gap: [N] mean planned mass flow times exhaust velocity, minus mean thrust, greatest over
@@ -204,10 +205,10 @@ def fly_plan(plan: Plan) -> Array:
     return out
 
 
-def pointing_excess(thrust: Array, limit: float | None) -> float:
+def pointing_excess(thrust: Array, limit: float | None, max_thrust: float) -> float:
     """[rad] by how much thrusts, shape (N, 3) in any unit, lean beyond a limit; next to none has no lean."""
     size = np.linalg.norm(thrust, axis=1)
-    burning = size > 1e-3 * max(float(size.max()), 1e-9)
+    burning = size > 1e-3 * max(float(size.max()), 1e-3 * max_thrust)  # what a solver leaves of zero is none
     if limit is None or not burning.any():
         return 0.0
     angle = np.arctan2(np.linalg.norm(thrust[burning, :2], axis=1), thrust[burning, 2])
@@ -249,13 +250,13 @@ def fly_residuals(plan: Plan) -> Residuals:
         velocity=float(velocity_error.max()),
         mass=float(np.abs(flown[:, 6] - plan.mass).max()),
         landing_position=float(position_error[-1]),
-        landing_velocity=float(np.linalg.norm(flown[-1, 3:6])),
+        landing_velocity=float(np.linalg.norm(flown[-1, 3:6] - problem.target_velocity)),
         thrust_above=max(0.0, float(size.max()) - lander.max_thrust),
         thrust_below=max(0.0, lander.min_thrust - float(size[::_BETWEEN].min())),
         thrust_dip=max(0.0, lander.min_thrust - float(size.min())),
-        pointing=pointing_excess(plan.thrust, lander.pointing_limit),
+        pointing=pointing_excess(plan.thrust, lander.pointing_limit, lander.max_thrust),
         glide_slope=_glide_excess(flown[:, :3] - flown[-1, :3], problem.glide_slope_limit),
-        altitude=max(0.0, float(problem.target[2] - fine[:, 2].min())),
+        altitude=max(0.0, float(min(problem.target[2], fine[0, 2]) - fine[:, 2].min())),
         speed=0.0 if problem.speed_limit is None else max(0.0, speed - problem.speed_limit),
         propellant=max(0.0, lander.dry_mass - float(flown[-1, 6])),
         relaxation_gap=_relaxation_gap(plan),

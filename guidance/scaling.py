@@ -50,6 +50,7 @@ class ScaledProblem:
         mass_ratio: ln(start mass / dry mass).
         position: start position from the target, shape (3,).
         velocity: start velocity, shape (3,).
+        target_velocity: velocity at the landing point, shape (3,).
         gravity: shape (3,).
         mass_bounds: affine thrust bounds.
         propellant: greatest allowed -zeta at the end.
@@ -65,6 +66,7 @@ class ScaledProblem:
     mass_ratio: float
     position: Array
     velocity: Array
+    target_velocity: Array
     gravity: Array
     mass_bounds: MassBounds
     propellant: float
@@ -80,7 +82,10 @@ class ScaledProblem:
 
     @property
     def reach(self) -> float:
-        """Bound on every scaled unknown of any flight within the thrust bounds (for certificates)."""
+        """Bound on every scaled unknown of any flight within the thrust bounds (for certificates).
+
+        All are reached from the start: the velocity at the end too, whatever is asked for.
+        """
         pull = float(np.linalg.norm(self.gravity))
         push = float(
             np.max(self.mass_bounds.upper_bound + np.abs(self.mass_bounds.upper_slope) * self.propellant)
@@ -162,7 +167,7 @@ def scale_problem(
         bounds = tangent_mass_bounds(problem, log_mass, kappa)
     loose = max(_LOOSE, math.exp(problem.log_mass_ratio))  # full thrust on the dry mass burns no more
     limit = lander.pointing_limit
-    speed = problem.speed_limit
+    speed = problem.speed_bound
     return ScaledProblem(
         time=time,
         acceleration=acceleration,
@@ -170,6 +175,7 @@ def scale_problem(
         mass_ratio=problem.log_mass_ratio,
         position=problem.offset / length,
         velocity=problem.state.velocity / (acceleration * time),
+        target_velocity=problem.target_velocity / (acceleration * time),
         gravity=problem.gravity / acceleration,
         mass_bounds=bounds,
         propellant=min(problem.log_mass_ratio / kappa, loose) if limit_propellant else loose,

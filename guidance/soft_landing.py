@@ -22,6 +22,7 @@ from guidance.constants import MOON_GRAVITY
 from guidance.lander import Lander
 from guidance.pdg import solve_pdg
 from guidance.plan import Plan, PlanStatus
+from guidance.problem import lies_below
 from guidance.state import State
 from guidance.tracking import TrackingReference, make_reference, states_at
 from guidance.validation import finite_number, finite_vector
@@ -102,7 +103,7 @@ class _Approach:
         """Plan to pass the gate at `sinking` [m/s] downward; None where the frame starts below the gate."""
         drift = np.array([0.0, 0.0, -sinking])
         start = self.state.position + drift * (time_of_flight or 0.0)
-        if start[2] < self.gate[2]:
+        if lies_below(start, self.gate):
             return None
         return solve_pdg(
             State(start, self.state.velocity - drift, self.state.mass),

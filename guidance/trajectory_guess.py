@@ -28,8 +28,8 @@ def least_energy_flight(problem: LandingProblem, nodes: int, time: float) -> dic
         Time, position, velocity, mass and thrust at the nodes, as a Plan holds them; the mass is a guess.
     """
     share = np.linspace(0.0, 1.0, nodes)[:, None]
-    start, speed = problem.offset, problem.state.velocity * time
-    second, third = -3.0 * start - 2.0 * speed, 2.0 * start + speed
+    start, speed, arrival = problem.offset, problem.state.velocity * time, problem.target_velocity * time
+    second, third = -3.0 * start - 2.0 * speed - arrival, 2.0 * start + speed + arrival
     push = (2.0 * second + 6.0 * third * share) / time**2 - problem.gravity
     push[:, 2] += 1e-3 * problem.lander.max_thrust / problem.state.mass  # a zero thrust has no direction
     burnt = np.linspace(0.0, 0.5 * problem.log_mass_ratio, nodes)

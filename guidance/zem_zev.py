@@ -192,8 +192,9 @@ def zem_zev_acceleration(
     time_to_go: float,
     gains: tuple[float, float] = (6.0, 2.0),
     gravity: ArrayLike = MOON_GRAVITY,
+    target_velocity: ArrayLike = (0.0, 0.0, 0.0),
 ) -> NDArray[np.float64]:
-    """Commanded thrust acceleration of ZEM/ZEV guidance to rest at `target` (the module's first equation).
+    """Commanded thrust acceleration of ZEM/ZEV guidance to `target` (the module's first equation).
 
     Args:
         state: present state.
@@ -201,6 +202,7 @@ def zem_zev_acceleration(
         time_to_go: [s] above zero.
         gains: (K_R, K_V); 6 and 2 minimise the integral of |a|^2/2.
         gravity: [m/s^2] shape (3,).
+        target_velocity: [m/s] shape (3,), v_f; rest unless given.
 
     Returns:
         [m/s^2] shape (3,), unsaturated.
@@ -209,16 +211,18 @@ def zem_zev_acceleration(
         ValueError: an argument is not finite or of the wrong shape, or the time to go is not positive.
     """
     position_gain, velocity_gain = finite_vector("gains", gains, 2)
+    time = finite_number("time_to_go", time_to_go, above=0.0)
+    arrival = finite_vector("target_velocity", target_velocity, 3)
     out = np.empty(3)
     zem_zev_into(
         state.as_array(),
         finite_vector("target", target, 3),
         (float(position_gain), float(velocity_gain)),
-        finite_number("time_to_go", time_to_go, above=0.0),
+        time,
         finite_vector("gravity", gravity, 3),
         out,
     )
-    return out
+    return out - velocity_gain / time * arrival  # the kernel knows no velocity at the target
 
 
 def saturate_thrust(thrust: ArrayLike, lander: Lander) -> NDArray[np.float64]:

@@ -65,6 +65,7 @@ def ask(problem: LandingProblem, nodes: int, time_of_flight: float | None, metho
             gravity=problem.gravity,
             glide_slope_limit=problem.glide_slope_limit,
             speed_limit=problem.speed_limit,
+            target_velocity=problem.target_velocity,
             time_of_flight=time_of_flight,
             nodes=nodes,
             method=method,  # type: ignore[arg-type]

@@ -52,6 +52,12 @@ def paper_start(rng):
     ]
 
 
+def arrival_velocity(rng, start):
+    """Velocity at the target: from rest to faster than free fall, any way but up."""
+    fall = np.sqrt(start[5] ** 2 + 2.0 * 1.62 * (start[2] - TARGET[2]))
+    return np.array([*rng.normal(0.0, 0.15, 2) * fall, -rng.uniform(0.0, 1.2) * fall])
+
+
 def harsh_start(rng):
     """Low, fast, short of propellant: about half of these cannot land."""
     distance, bearing = rng.uniform(0.0, 300.0), rng.uniform(0.0, 2.0 * np.pi)

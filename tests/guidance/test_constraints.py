@@ -24,6 +24,7 @@ PROBLEM = LandingProblem(
     np.array([0.1, -0.2, -1.62]),
     glide_slope_limit=0.5,
     speed_limit=40.0,
+    target_velocity=np.array([1.0, -2.0, -6.0]),
 )
 TIME = 20.0
 SCALED = scale_problem(PROBLEM, TIME, NODES, error_limit=3.0, limit_propellant=True)
@@ -181,8 +182,10 @@ def test_start_and_landing():
     for layout, fixed in ((LAYOUT, 6), (FREE, 4)):
         rows = constraints.landing(layout, SCALED)
         assert rows.bound.size == fixed
-        assert rows.violation(filled(layout)) == 0.0
-        assert rows.violation(filled(layout, velocity=np.array([0.0, 0.0, 0.01]))) == pytest.approx(0.01)
+        arrived = PROBLEM.target_velocity / (SCALED.acceleration * TIME)
+        assert rows.violation(filled(layout, velocity=arrived)) == pytest.approx(0.0, abs=1e-15)
+        missed = arrived + np.array([0.0, 0.0, 0.01])
+        assert rows.violation(filled(layout, velocity=missed)) == pytest.approx(0.01)
 
 
 def test_motion_is_the_true_motion():
@@ -223,6 +226,7 @@ def test_numbers_go_with_time_as_declared():
     whole: list[Family] = [
         constraints.start,
         constraints.motion,
+        constraints.landing,
         constraints.max_thrust,
         constraints.min_thrust,
         constraints.pointing,

@@ -1,6 +1,8 @@
 """Descents that users have brought and the planner once failed on; and sweeps over their kinds."""
 
 import math
+from collections.abc import Callable
+from typing import cast
 
 import numpy as np
 import pytest
@@ -68,16 +70,21 @@ def test_a_vertical_flight_leaves_its_axis_where_that_is_cheaper(state, lander, 
     assert by_reference.propellant == pytest.approx(propellant, rel=0.02)
 
 
+def root(function: Callable[[float], float], high: float) -> float:
+    """Where a function changes its sign between zero and `high`."""
+    return float(cast("float", brentq(function, 0.0, high)))
+
+
 def shortest_vertical_flight(start, lander, gravity):
     """[s] full thrust down, then full thrust up: exact motion that ends at rest at zero."""
     force = np.array([0.0, 0.0, lander.max_thrust])
 
     def height_at_rest(down):
         turned = propagate(start, -force, down, lander, gravity)
-        up = brentq(lambda t: propagate(turned, force, t, lander, gravity).velocity[2], 0.0, 200.0)
+        up = root(lambda t: propagate(turned, force, t, lander, gravity).velocity[2], 200.0)
         return propagate(turned, force, up, lander, gravity).position[2], down + up
 
-    switch = brentq(lambda t: height_at_rest(t)[0], 0.0, 12.0)
+    switch = root(lambda t: height_at_rest(t)[0], 12.0)
     return height_at_rest(switch)[1]
 
 

@@ -21,6 +21,16 @@ def test_prints_and_draws(capsys, tmp_path):
     assert picture.stat().st_size > 10_000
 
 
+def test_arrives_with_the_velocity_that_was_asked_for(capsys):
+    fast, up = ([*STATE, "--target-velocity", "0", "0", vertical] for vertical in ("-12", "3"))
+    main(fast)
+    assert "optimal (convex)" in capsys.readouterr().out
+    with pytest.raises(SystemExit) as caught:
+        main(up)
+    assert caught.value.code == 1
+    assert "altitude" in capsys.readouterr().err
+
+
 def test_module_runs_and_explains_itself():
     done = subprocess.run(
         [sys.executable, "-m", "guidance.pdg", "--help"], capture_output=True, text=True, check=True, cwd=ROOT

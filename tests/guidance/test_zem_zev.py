@@ -143,6 +143,43 @@ def test_hover_over_the_target_takes_the_weight():
     np.testing.assert_allclose(zem_zev_acceleration(state, TARGET, 7.0), -GRAVITY, atol=1e-14)
 
 
+@given(
+    position=vectors(1000.0),
+    velocity=vectors(60.0),
+    arrival=vectors(60.0),
+    gains=st.tuples(st.floats(1.0, 9.0), st.floats(1.0, 9.0)),
+    duration=st.floats(0.1, 100.0),
+)
+def test_a_velocity_at_the_target_is_rest_in_the_frame_that_moves_with_it(
+    position, velocity, arrival, gains, duration
+):
+    """There the target is where that frame will have carried it, and ZEM and ZEV are the same."""
+    here = State(TARGET + position, velocity, 1000.0)
+    moving = State(here.position + arrival * duration, velocity - arrival, 1000.0)
+    found = zem_zev_acceleration(here, TARGET, duration, gains, target_velocity=arrival)
+    expected = zem_zev_acceleration(moving, TARGET, duration, gains)
+    np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9 * (1.0 + 1e3 / duration**2))
+
+
+@pytest.mark.parametrize("arrival", [[0.0, 0.0, -12.0], [8.0, -5.0, 3.0]])
+def test_undisturbed_flight_arrives_with_the_velocity_after_the_time_to_go(arrival):
+    duration = time_to_go(START, TARGET, target_velocity=arrival)
+
+    def rate(time, y):
+        now, left = State(y[:3], y[3:6], 1.0), duration - time
+        return np.concatenate(
+            [y[3:6], zem_zev_acceleration(now, TARGET, left, target_velocity=arrival) + GRAVITY]
+        )
+
+    start, stop = np.concatenate([START.position, START.velocity]), 1e-3
+    path = solve_ivp(rate, (0.0, duration - stop), start, method="DOP853", rtol=1e-12, atol=1e-10)
+    np.testing.assert_allclose(path.y[:3, -1] + stop * np.array(arrival), TARGET, atol=1e-4)
+    np.testing.assert_allclose(path.y[3:6, -1], arrival, atol=0.02)
+    halfway = solve_ivp(rate, (0.0, 0.5 * duration), start, method="DOP853", rtol=1e-12, atol=1e-10).y[:, -1]
+    left = time_to_go(State(halfway[:3], halfway[3:], 1.0), TARGET, target_velocity=arrival)
+    assert left == pytest.approx(0.5 * duration, rel=1e-6)
+
+
 @pytest.mark.parametrize(
     ("argument", "value"),
     [
@@ -160,6 +197,8 @@ def test_hover_over_the_target_takes_the_weight():
         ("gains", (6.0,)),
         ("gains", (6.0, 2.0, 1.0)),
         ("gains", None),
+        ("target_velocity", [0.0, 0.0]),
+        ("target_velocity", [0.0, 0.0, math.nan]),
     ],
 )
 def test_wrong_argument_of_the_law_is_named(argument, value):

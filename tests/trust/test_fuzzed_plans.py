@@ -23,6 +23,7 @@ def assert_flies(plan: Plan) -> None:
     """Flown through the true motion, the plan lands and keeps every limit."""
     assert plan.status is PlanStatus.OPTIMAL
     check = plan.residuals
+    assert np.abs(plan.velocity[-1] - plan.problem.target_velocity).max() < 1e-3
     scale = max(1.0, float(np.abs(plan.position).max()) / 1000.0, float(np.abs(plan.velocity).max()) / 100.0)
     assert check.landing_position < 1.0 * scale
     assert check.landing_velocity < 0.5 * scale
@@ -37,15 +38,18 @@ def assert_flies(plan: Plan) -> None:
     data=st.data(),
     state=SENSIBLE,
     target=st.tuples(*(st.floats(-500.0, 500.0),) * 2, st.just(50.0)).map(list),
+    arrival=st.one_of(st.just((0.0, 0.0, 0.0)), st.tuples(*(st.floats(-30.0, 30.0),) * 3)).map(list),
 )
-def test_any_state_and_target(data: st.DataObject, state: list[float], target: list[float]) -> None:
-    for numbers in (state, target):
+def test_any_state_and_target(
+    data: st.DataObject, state: list[float], target: list[float], arrival: list[float]
+) -> None:
+    for numbers in (state, target, arrival):
         if data.draw(st.integers(0, 3)) == 0:
             numbers[data.draw(st.integers(0, len(numbers) - 1))] = data.draw(ODD)
     try:
-        plan = guidance.solve_pdg(state, target, throw=False)
+        plan = guidance.solve_pdg(state, target, target_velocity=arrival, throw=False)
     except ValueError:
-        numbers = np.abs([*state, *target])
+        numbers = np.abs([*state, *target, *arrival])
         outside = not np.isfinite(numbers).all() or numbers.max() > 1e9
         assert outside or state[6] <= 1150.0 or state[2] < target[2]
         return
