@@ -88,6 +88,21 @@ def test_a_rollout_equals_fly_exactly(preset, seed):
     assert info["safe_site"] == record.outcome.safe_site
 
 
+def test_a_rollout_keeps_the_landers_pointing_limit_as_fly_does():
+    upright = replace(PRESETS["paper"].lander, pointing_limit=math.radians(15.0))
+    preset = replace(PRESETS["paper"], lander=upright)
+    scenario = sample_scenario(preset, 5, 1, "train")
+    actions = random_actions(1)
+    record = fly(ScriptedPolicy(actions), scenario)
+    env = LunarHDAMapEnv(preset)
+    env.reset(options={"scenario": scenario})
+    for k, segment in enumerate(record.segments):
+        env.step(actions[k])
+        np.testing.assert_array_equal(env.steps[k].segment.path, segment.path)
+    assert sum(step.segment.pointing_limited for step in env.steps) == record.pointing_limited > 0
+    assert record.maximum_tilt == pytest.approx(math.radians(15.0), abs=1e-9)
+
+
 def test_seeded_episodes_are_those_of_sample_scenario():
     env = LunarHDAEnv()
     for episode in range(3):
