@@ -17,8 +17,8 @@ from guidance.validation import finite_vector
 Array = NDArray[np.float64]
 
 _UNFELT = 0.05
-"""[m/s^2] beyond the pointing limit that the feedback makes up for: sampled, a coasting engine's thrust is not
-quite nothing, and points anywhere."""
+"""[m/s^2] beyond the pointing limit that the feedback makes up for: sampled, a coasting engine's thrust is
+not quite nothing, and points anywhere."""
 
 
 def shift_landing_point(reference: TrackingReference, site: Array, gravity: Array) -> TrackingReference:

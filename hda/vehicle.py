@@ -2,9 +2,9 @@
 
 At each control instant the law gives a thrust, the vehicle takes the nearest within its bounds and its
 pointing limit (`guidance.thrust_limits`), applies it with this interval's relative error, and holds it for
-one control period; motion under a held thrust is exact (`guidance.dynamics`). When the time to go falls to half a control period the engine is cut off and the
-vehicle falls freely to the target plane. The flight ends where the plane is crossed, whatever the engine
-does.
+one control period; motion under a held thrust is exact (`guidance.dynamics`). When the time to go falls to
+half a control period the engine is cut off and the vehicle falls freely to the target plane. The flight ends
+where the plane is crossed, whatever the engine does.
 """
 
 from __future__ import annotations
@@ -237,7 +237,9 @@ def fly_interval(
     if isinstance(command, ZemZevCommand):
         gains = (command.position_gain, command.velocity_gain)
         clock = (command.time_to_go, command.time_to_go_rate, period)
-        nodes, status, limited = _fly_zem_zev(start, decision.site, gains, clock, drawn, gravity, vehicle, log)
+        nodes, status, limited = _fly_zem_zev(
+            start, decision.site, gains, clock, drawn, gravity, vehicle, log
+        )
         left = command.time_to_go - command.time_to_go_rate * float(time[nodes - 1])
     else:
         reference = command.reference

@@ -58,17 +58,18 @@ def least_distance(command: np.ndarray, lander: Lander) -> float:
 @example(size=5000.0, direction=(1.0, 0.0, 0.0), degrees=90.0, least=0.0)
 @example(size=0.0, direction=(0.0, 0.0, 1.0), degrees=10.0, least=1500.0)
 def test_no_admissible_thrust_is_nearer(size, direction, degrees, least):
-    lander = Lander(min_thrust=least, pointing_limit=math.radians(degrees))
+    limit = math.radians(degrees)
+    lander = Lander(min_thrust=least, pointing_limit=limit)
     command = vector(size, direction)
     given_thrust = saturate_thrust(command, lander)
     magnitude = float(np.linalg.norm(given_thrust))
     assert least * (1.0 - 1e-12) <= magnitude <= lander.max_thrust * (1.0 + 1e-12)
     if magnitude > 0.0:
-        assert tilt(given_thrust) <= lander.pointing_limit + 1e-11
+        assert tilt(given_thrust) <= limit + 1e-11
     distance = float(np.linalg.norm(given_thrust - command))
     assert distance <= least_distance(command, lander) + 0.02  # [N] the search's own accuracy
     rng = np.random.default_rng(1)
-    lean = np.arccos(rng.uniform(math.cos(lander.pointing_limit), 1.0, 4000))
+    lean = np.arccos(rng.uniform(math.cos(limit), 1.0, 4000))
     azimuth, others = rng.uniform(0.0, 2.0 * math.pi, 4000), rng.uniform(least, lander.max_thrust, 4000)
     across = others * np.sin(lean)
     points = np.column_stack([across * np.cos(azimuth), across * np.sin(azimuth), others * np.cos(lean)])

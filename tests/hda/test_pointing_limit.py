@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import hda
 from guidance import MOON_GRAVITY, Lander, State, time_to_go, zem_zev_acceleration
 from hda.episode import EpisodeRecord
-from hda.policy import Decision, DecisionStatus, ZemZevCommand
+from hda.policy import Decision, DecisionStatus, PlanCommand, ZemZevCommand
 from hda.presets import PRESETS
 from hda.scenario import Preset
 from hda.vehicle import FlightErrors, Segment, fly_interval
@@ -43,7 +43,8 @@ def random_interval(seed: int, lander: Lander) -> tuple[Segment, ZemZevCommand]:
     rng = np.random.default_rng(seed)
     height = rng.uniform(20.0, 900.0)
     offset = np.array([*rng.uniform(-0.5, 0.5, 2), 1.0]) * height
-    state = State(SITE + offset, np.array([*rng.uniform(-10, 10, 2), -rng.uniform(0.3, 1.2) * height**0.5]), 1200.0)
+    sink = rng.uniform(0.3, 1.2) * height**0.5
+    state = State(SITE + offset, np.array([*rng.uniform(-10, 10, 2), -sink]), 1200.0)
     command = ZemZevCommand(6.0, 2.0, time_to_go(state, SITE) * rng.uniform(0.8, 1.2))
     errors = FlightErrors(rng.uniform(-0.05, 0.05))
     return fly_interval(state, Decision(SITE, command), lander, GRAVITY, (0.5, 10), errors), command
@@ -117,7 +118,7 @@ def test_plans_leave_the_feedback_a_tenth_of_the_limit(degrees):
     checked = 0
     for decision in record.decisions:
         if decision.status is DecisionStatus.NOMINAL:
-            assert isinstance(decision.command, hda.policy.PlanCommand)
+            assert isinstance(decision.command, PlanCommand)
             push = decision.command.reference.thrust_acceleration
             felt = push[np.linalg.norm(push, axis=1) > 0.05]
             assert tilts(felt).max() <= math.radians(0.9 * degrees) + 2e-3
