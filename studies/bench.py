@@ -10,6 +10,7 @@ import tyro
 from rich.console import Console
 from rich.table import Table
 
+from guidance.console import tolerate_encoding
 from guidance.validation import finite_number
 from hda.episode import advance, begin_flight, observe
 from hda.policy import PrivilegedPolicy
@@ -87,6 +88,7 @@ def bench(options: Bench) -> None:
 
 def main() -> None:
     """Command line; a wrong option is one line on stderr and exit code 2."""
+    tolerate_encoding()
     options = tyro.cli(Bench, description=__doc__)
     with one_line_errors():
         bench(options)
