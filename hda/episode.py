@@ -132,10 +132,8 @@ class EpisodeRecord:
     @property
     def maximum_tilt(self) -> float:
         """[rad] greatest angle of the thrust from the vertical while the engine burnt; 0 if it never did."""
-        thrust = self.commanded_thrust
-        burning = thrust[thrust.any(axis=1)]
-        tilt = np.arctan2(np.hypot(burning[:, 0], burning[:, 1]), burning[:, 2])
-        return float(tilt.max(initial=0.0))
+        east, north, up = self.commanded_thrust.T + 0.0  # no thrust reads as 0, and -0.0 as 0.0
+        return float(np.arctan2(np.hypot(east, north), up).max())
 
     @property
     def pointing_limited(self) -> int:
@@ -160,10 +158,7 @@ def elevation_angle(position: NDArray[np.float64], target: NDArray[np.float64]) 
 
 
 def begin_flight(scenario: Scenario) -> Flight:
-    """Stand at t = 0: first target, and the time to go of the quartic to it.
-
-    Where the lander has a pointing limit, it is the time to go that keeps it (`guidance.upright_time`).
-    """
+    """Stand at t = 0: first target, and time to go of the quartic to it, or longer under a pointing limit."""
     state, preset = scenario.initial_state, scenario.preset
     target = scenario.nominal_target
     clock = upright_time_to_go(estimated_state(scenario, state), target, preset.lander, preset.gravity)

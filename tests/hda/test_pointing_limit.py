@@ -136,5 +136,5 @@ def test_an_engine_that_cannot_stop_keeps_its_limit_too():
 
 def test_an_engine_that_never_burnt_leant_nowhere():
     record = fly("no-divert", limited(None), 0)
-    still = replace(record.segments[0], commanded=np.zeros_like(record.segments[0].commanded))
+    still = replace(record.segments[0], commanded=np.full_like(record.segments[0].commanded, -0.0))
     assert replace(record, segments=(still,)).maximum_tilt == 0.0
