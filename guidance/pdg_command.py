@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+from guidance.console import tolerate_encoding
 from guidance.errors import GuidanceError
 from guidance.lander import Lander
 from guidance.pdg import DEFAULT_NODES, solve_pdg
@@ -100,6 +101,7 @@ def main(arguments: list[str] | None = None) -> None:
     """Run the command; exit status 1 without a flight, 2 for a wrong argument."""
     import tyro
 
+    tolerate_encoding()
     command = tyro.cli(PdgCommand, args=arguments, prog="python -m guidance.pdg")
     try:
         plan = command.solve()

@@ -16,6 +16,10 @@ from guidance.validation import finite_vector
 
 Array = NDArray[np.float64]
 
+_UNFELT = 0.05
+"""[m/s^2] beyond the pointing limit that the feedback makes up for: sampled, a coasting engine's thrust is
+not quite nothing, and points anywhere."""
+
 
 def shift_landing_point(reference: TrackingReference, site: Array, gravity: Array) -> TrackingReference:
     """Move the end of a descent to `site` by a quintic of least jerk with rest at both ends.
@@ -59,3 +63,21 @@ def within_thrust(reference: TrackingReference, lander: Lander, mass: float, res
     """
     push = np.linalg.norm(reference.thrust_acceleration, axis=1) * mass
     return bool(push.max() <= (1.0 - reserve) * lander.max_thrust)
+
+
+def within_pointing(reference: TrackingReference, lander: Lander, reserve: float) -> bool:
+    """Whether a reference points no further from the vertical than the limit less a share `reserve`.
+
+    Args:
+        reference: what would be flown.
+        lander: the vehicle; without a pointing limit every reference keeps it.
+        reserve: share of the limit that is left to the feedback.
+    """
+    if lander.pointing_limit is None:
+        return True
+    limit = lander.pointing_limit * (1.0 - reserve)
+    push = reference.thrust_acceleration
+    size = np.linalg.norm(push, axis=1)
+    beyond = np.arctan2(np.hypot(push[:, 0], push[:, 1]), push[:, 2]) - limit
+    taken = size * np.sin(np.clip(beyond, 0.0, 0.5 * np.pi))  # distance from the nearest thrust within it
+    return bool(taken.max() <= _UNFELT)

@@ -6,7 +6,8 @@ d over a time t_d stops at the site, d t_d^2 / 2 above it, passed at the speed d
 plans to rest; in a frame that moves with the gate's velocity the gate is passed at rest, and the equations of
 motion are the same.
 
-The plan keeps a margin of thrust, so that the feedback can make up for a weak engine.
+The plan keeps a margin of thrust, so that the feedback can make up for a weak engine, and a margin of the
+lander's pointing limit, so that it can lean over a little further.
 """
 
 from __future__ import annotations
@@ -36,6 +37,7 @@ class SoftLandingOptions:
 
     Attributes:
         thrust_margin: share of the greatest thrust that the plan leaves to the feedback.
+        pointing_margin: share of the lander's pointing limit, if it has one, that it leaves to the feedback.
         terminal_periods: control periods of the terminal phase.
         terminal_deceleration: [m/s^2] net deceleration in it.
         speed_limit: [m/s] greatest speed, or the present speed and a little where that is faster; None for
@@ -50,10 +52,12 @@ class SoftLandingOptions:
     speed_limit: float | None = None
     nodes: int = 31
     method: Literal["convex", "casadi", "cvxpy"] = "convex"
+    pointing_margin: float = 0.1
 
     def __post_init__(self) -> None:
         """Check every field that no planner checks."""
         finite_number("thrust_margin", self.thrust_margin, at_least=0.0, at_most=0.9)
+        finite_number("pointing_margin", self.pointing_margin, at_least=0.0, at_most=0.9)
         finite_number("terminal_periods", self.terminal_periods, at_least=1)
         finite_number("terminal_deceleration", self.terminal_deceleration, above=0.0)
 
@@ -157,7 +161,7 @@ def plan_soft_landing(
     Args:
         state: start of the plan, not below the gate.
         site: [m] shape (3,).
-        lander: the vehicle; the plan keeps `options.thrust_margin` of its thrust.
+        lander: the vehicle; the plan keeps the options' margins of its thrust and its pointing limit.
         control_period: [s] time over which a thrust is held.
         options: how the plan is made.
         gravity: [m/s^2] shape (3,), along -z.
@@ -170,7 +174,7 @@ def plan_soft_landing(
     Raises:
         ValueError: an argument is out of range, such as a start below the gate.
     """
-    engine = replace(lander, max_thrust=lander.max_thrust * (1.0 - options.thrust_margin))
+    engine = _with_margins(lander, options)
     duration = options.terminal_periods * control_period
     speed = options.terminal_deceleration * duration
     gate = finite_vector("site", site, 3) + np.array([0.0, 0.0, 0.5 * speed * duration])
@@ -195,6 +199,16 @@ def plan_soft_landing(
         if plan is not None and plan.landing_error <= search.landing_error + _LANDING_ERROR_SLACK:
             return SoftLanding(search.status, sample_descent(plan, sinking, control_period, options), plan)
     return SoftLanding(PlanStatus.LIMIT_REACHED, None, search)
+
+
+def _with_margins(lander: Lander, options: SoftLandingOptions) -> Lander:
+    """The vehicle that plans are made for: what the feedback may use is left out."""
+    limit = lander.pointing_limit
+    return replace(
+        lander,
+        max_thrust=lander.max_thrust * (1.0 - options.thrust_margin),
+        pointing_limit=None if limit is None else limit * (1.0 - options.pointing_margin),
+    )
 
 
 def sample_descent(

@@ -23,6 +23,7 @@ from guidance.constants import MOON_GRAVITY
 from guidance.kernel import compile_kernel
 from guidance.lander import Lander
 from guidance.state import State
+from guidance.thrust_limits import limit_into, pointing_angle
 from guidance.validation import finite_number, finite_vector
 
 
@@ -121,24 +122,6 @@ def zem_zev_into(
         out[axis] = gains[0] * miss / (time_to_go * time_to_go) - gains[1] * velocity_miss / time_to_go
 
 
-@compile_kernel
-def saturate_into(thrust: NDArray[np.float64], min_thrust: float, max_thrust: float) -> None:
-    """Bring |thrust| into [min_thrust, max_thrust] in place, direction kept; a zero vector points up."""
-    largest = max(abs(thrust[0]), abs(thrust[1]), abs(thrust[2]))
-    if largest == 0.0:
-        thrust[2] = min_thrust
-        return
-    # relative to the largest component nothing overflows, however large the command
-    relative = math.sqrt((thrust[0] / largest) ** 2 + (thrust[1] / largest) ** 2 + (thrust[2] / largest) ** 2)
-    magnitude = largest * relative
-    if magnitude > max_thrust:
-        for axis in range(3):
-            thrust[axis] = thrust[axis] / largest * (max_thrust / relative)
-    elif magnitude < min_thrust:
-        for axis in range(3):
-            thrust[axis] = thrust[axis] / largest * (min_thrust / relative)
-
-
 def quartic_fourth_power(gravity: NDArray[np.float64], time_weight: float | None) -> float:
     """Factor of t^4 in the time-to-go quartic, [m^2/s^4]: W + |g|^2/2, with None for the paper's W = |g|^2/2.
 
@@ -226,13 +209,21 @@ def zem_zev_acceleration(
 
 
 def saturate_thrust(thrust: ArrayLike, lander: Lander) -> NDArray[np.float64]:
-    """What the engine gives for a commanded thrust [N], shape (3,): magnitude in its bounds, direction kept.
+    """What the vehicle gives for a commanded thrust: the nearest that keeps its bounds and pointing limit.
 
-    A zero command to an engine that cannot stop (min_thrust > 0) points up.
+    Within the pointing limit the direction is kept. A zero command to an engine that cannot stop
+    (min_thrust > 0) points up.
+
+    Args:
+        thrust: [N] shape (3,).
+        lander: the vehicle.
+
+    Returns:
+        [N] shape (3,).
 
     Raises:
         ValueError: `thrust` is not finite or of the wrong shape.
     """
     limited = finite_vector("thrust", thrust, 3)
-    saturate_into(limited, lander.min_thrust, lander.max_thrust)
+    limit_into(limited, lander.min_thrust, lander.max_thrust, pointing_angle(lander))
     return limited

@@ -6,6 +6,7 @@ row north and column east.
 
 from typing import TYPE_CHECKING
 
+import hda.own_guidance  # noqa: F401 - before anything of `guidance`: another one may stand in the way
 from guidance.exports import lazy_exports
 
 if TYPE_CHECKING:

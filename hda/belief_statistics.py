@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from guidance.console import tolerate_encoding
 from hda.belief import LEVEL_SHARES, LEVELS
 from hda.dtm_library import Ground, load_tile
 from hda.presets import PRESETS
@@ -77,6 +78,7 @@ def measure() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 def main() -> None:
     """Print, or write, what was counted."""
+    tolerate_encoding()
     levels, table = measure()
     out = sys.stdout.write
     out("levels of V_P: " + " ".join(f"{share:.4f}" for share in levels) + "\n")

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from guidance.state import State
-from guidance.zem_zev import time_to_go
+from guidance.upright_time import upright_time_to_go
 from hda.lidar import look
 from hda.observation import Observation
 from hda.outcome import Outcome, RewardTerms, classify, score_step
@@ -116,7 +116,7 @@ class EpisodeRecord:
 
     @property
     def commanded_thrust(self) -> NDArray[np.float64]:
-        """[N] shape (n - 1, 3), saturated command held over each interval."""
+        """[N] shape (n - 1, 3), command within the vehicle's limits, held over each interval."""
         return np.concatenate([s.commanded for s in self.segments])
 
     @property
@@ -128,6 +128,17 @@ class EpisodeRecord:
     def maximum_thrust(self) -> float:
         """[N] greatest applied thrust."""
         return float(np.sqrt((self.thrust**2).sum(axis=1).max()))
+
+    @property
+    def maximum_tilt(self) -> float:
+        """[rad] greatest angle of the thrust from the vertical while the engine burnt; 0 if it never did."""
+        east, north, up = self.commanded_thrust.T + 0.0  # no thrust reads as 0, and -0.0 as 0.0
+        return float(np.arctan2(np.hypot(east, north), up).max())
+
+    @property
+    def pointing_limited(self) -> int:
+        """Control periods in which the lander's pointing limit changed the commanded thrust."""
+        return sum(segment.pointing_limited for segment in self.segments)
 
     @property
     def total_reward(self) -> float:
@@ -147,10 +158,10 @@ def elevation_angle(position: NDArray[np.float64], target: NDArray[np.float64]) 
 
 
 def begin_flight(scenario: Scenario) -> Flight:
-    """Stand at t = 0: first target, and the time to go of the quartic to it."""
-    state = scenario.initial_state
+    """Stand at t = 0: first target, and time to go of the quartic to it, or longer under a pointing limit."""
+    state, preset = scenario.initial_state, scenario.preset
     target = scenario.nominal_target
-    clock = time_to_go(estimated_state(scenario, state), target, scenario.preset.gravity)
+    clock = upright_time_to_go(estimated_state(scenario, state), target, preset.lander, preset.gravity)
     return Flight(0, state, target, clock)
 
 

@@ -16,8 +16,8 @@ from guidance.kernel import compile_kernel
 FLYING, TOUCHDOWN, TANK_EMPTY = 0, 1, 2
 """Where a period leaves the vehicle: `hda.vehicle.FlightStatus` as plain numbers."""
 
-VehicleNumbers = tuple[float, float, float, float]
-"""Least thrust [N], greatest thrust [N], exhaust velocity [m/s], dry mass [kg]."""
+VehicleNumbers = tuple[float, float, float, float, float]
+"""Least thrust [N], greatest thrust [N], exhaust velocity [m/s], dry mass [kg], pointing limit [rad]."""
 
 
 @compile_kernel

@@ -3,6 +3,10 @@
 `SeedSequence([study_seed, episode]).spawn(4)` gives the scenario, sensor, actuator and policy streams. Look k
 and interval k draw from children of their own, keyed by k, so that two policies that fly the same episode
 meet the same noise at the same look, even if one of them draws more or flies longer.
+
+SeedSequence reads a number as words of 32 bits, and pads two words with two zeros. A study seed of more words
+would run into the episode's: (2^32, 0) into (0, 1). It is therefore given as its first word, the episode, how
+many words follow, and these; the count is zero for the others, so that no two seeds share streams.
 """
 
 from __future__ import annotations
@@ -13,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 _SCENARIO, _SENSOR, _ACTUATOR, _POLICY = range(4)
+_WORD = 2**32
 
 
 @dataclass(frozen=True)
@@ -20,11 +25,11 @@ class EpisodeStreams:
     """The four random streams of one episode.
 
     Attributes:
-        study_seed: seed of the whole study, at least zero and below 2^32.
+        study_seed: seed of the whole study, at least zero; of any size.
         episode: number of the episode within the study, at least zero and below 2^32.
 
     Raises:
-        ValueError: a field is not such a whole number (larger ones would share streams with smaller ones).
+        ValueError: a field is not such a whole number.
     """
 
     study_seed: int
@@ -36,11 +41,16 @@ class EpisodeStreams:
             value = getattr(self, name)
             if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 0:
                 raise ValueError(f"{name} must be a whole number of at least 0, got {value!r}")
-            if value >= 2**32:
-                raise ValueError(f"{name} must be below 2^32, got {value!r}")
+        if self.episode >= _WORD:
+            raise ValueError(f"episode must be below 2^32, got {self.episode!r}")
 
     def _generator(self, *key: int) -> np.random.Generator:
-        sequence = np.random.SeedSequence((int(self.study_seed), int(self.episode)), spawn_key=key)
+        entropy = [int(self.study_seed) % _WORD, int(self.episode)]
+        rest = int(self.study_seed) // _WORD
+        if rest:
+            words = [rest >> shift & _WORD - 1 for shift in range(0, rest.bit_length(), 32)]
+            entropy += [len(words), *words]
+        sequence = np.random.SeedSequence(entropy, spawn_key=key)
         return np.random.Generator(np.random.PCG64(sequence))
 
     def scenario(self) -> np.random.Generator:

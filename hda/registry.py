@@ -6,8 +6,10 @@ entry-point group `lunar_hda.policies`, or a path `package.module:Name` to a pol
 
 from __future__ import annotations
 
+import difflib
 import importlib
 import re
+import sys
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -20,6 +22,21 @@ from hda.presets import unknown_name
 AnyPolicy = Policy[Any] | PrivilegedPolicy
 
 ENTRY_POINT_GROUP = "lunar_hda.policies"
+
+AGENTS = (
+    "td3",
+    "td3-fixed-gain",
+    "td3+convex",
+    "sac",
+    "td3-lstm",
+    "td3-lstm-plus",
+    "td3-paper",
+    "td3-partial",
+    "td3-lstm-partial",
+    "td3-lstm-plus-partial",
+)
+"""Names that `import rl` registers; this package may not import it, but may say so."""
+
 _NAME = re.compile(r"[a-z0-9][a-z0-9+._-]{0,59}")
 
 
@@ -85,7 +102,7 @@ def policy_entry(name: str) -> PolicyEntry:
         return _entry_of_path(name)
     entries = _registry(plugins=True)
     if name not in entries:
-        raise ValueError(unknown_name("policy", name, entries))
+        raise ValueError(unknown_name("policy", name, entries) + _agents_hint(name))
     return entries[name]
 
 
@@ -124,6 +141,13 @@ def describe_policy(target: object, origin: str) -> PolicyEntry:
     lines = (type(policy).__doc__ or "").strip().splitlines()
     summary = lines[0] if lines else f"from {origin}"
     return PolicyEntry(name, make, summary, privileged=isinstance(policy, PrivilegedPolicy))
+
+
+def _agents_hint(name: object) -> str:
+    """Say how the agents come into the registry, where a name means one and nobody has registered them."""
+    if "rl.catalogue" in sys.modules or not difflib.get_close_matches(str(name), AGENTS, n=1, cutoff=0.8):
+        return ""
+    return "; `import rl` registers the agents"
 
 
 def _entry_of_path(path: str) -> PolicyEntry:

@@ -106,6 +106,8 @@ def _generate_rocks(
 if __name__ == "__main__":
     import tyro
 
+    from guidance.console import tolerate_encoding
     from hda.terrain_picture import show_terrain
 
+    tolerate_encoding()
     tyro.cli(show_terrain)

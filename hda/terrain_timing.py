@@ -84,4 +84,7 @@ def print_timings(repeats: int = 7, size: int = 1000) -> None:
 if __name__ == "__main__":
     import tyro
 
+    from guidance.console import tolerate_encoding
+
+    tolerate_encoding()
     tyro.cli(print_timings)

@@ -1,10 +1,10 @@
-"""The vehicle between two looks: it flies a command at the control rate and saturates the thrust.
+"""The vehicle between two looks: it flies a command at the control rate within the limits of its thrust.
 
-At each control instant the law gives a thrust, the engine saturates it, applies it with this interval's
-relative error, and holds it for one control period; motion under a held thrust is exact
-(`guidance.dynamics`). When the time to go falls to half a control period the engine is cut off and the
-vehicle falls freely to the target plane. The flight ends where the plane is crossed, whatever the engine
-does.
+At each control instant the law gives a thrust, the vehicle takes the nearest within its bounds and its
+pointing limit (`guidance.thrust_limits`), applies it with this interval's relative error, and holds it for
+one control period; motion under a held thrust is exact (`guidance.dynamics`). When the time to go falls to
+half a control period the engine is cut off and the vehicle falls freely to the target plane. The flight ends
+where the plane is crossed, whatever the engine does.
 """
 
 from __future__ import annotations
@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from guidance.kernel import compile_kernel
 from guidance.lander import Lander
 from guidance.state import State
-from guidance.zem_zev import saturate_into, zem_zev_into
+from guidance.thrust_limits import limit_into, pointing_angle
+from guidance.zem_zev import zem_zev_into
 from hda import held_thrust
 from hda.held_thrust import FLYING, TOUCHDOWN, VehicleNumbers, fall_to_plane, hold_period
 from hda.policy import Decision, ZemZevCommand
@@ -60,10 +61,11 @@ class Segment:
     Attributes:
         time: [s] shape (n,), since the decision.
         path: shape (n, 7): position [m], velocity [m/s], mass [kg].
-        commanded: [N] shape (n - 1, 3), thrust after saturation, held over each interval.
+        commanded: [N] shape (n - 1, 3), thrust within the vehicle's limits, held over each interval.
         time_to_go: [s] what remains at the last node.
         thrust_error: relative error of the applied thrust over the whole segment.
         status: where the vehicle is at the last node.
+        pointing_limited: control periods in which the pointing limit changed the thrust.
     """
 
     time: NDArray[np.float64]
@@ -72,6 +74,7 @@ class Segment:
     time_to_go: float
     thrust_error: float
     status: FlightStatus
+    pointing_limited: int = 0
 
     @property
     def final_state(self) -> State:
@@ -89,12 +92,16 @@ def _fly_zem_zev(
     gravity: NDArray[np.float64],
     vehicle: VehicleNumbers,
     log: _Log,
-) -> tuple[int, int]:
-    """Fly one interval; `clock` = (time to go, its rate, control period). Returns (nodes written, status)."""
+) -> tuple[int, int, int]:
+    """Fly one interval; `clock` = (time to go, its rate, control period).
+
+    Returns (nodes written, status, control periods in which the pointing limit acted).
+    """
     time, path, commanded = log
     time_to_go, rate, period = clock
     thrust_error, navigation = errors
     seen = start.copy()
+    limited = 0
     periods = commanded.shape[0] - 1
     path[0] = start
     time[0] = 0.0
@@ -103,20 +110,21 @@ def _fly_zem_zev(
         if remaining <= 0.5 * period:
             commanded[k] = 0.0
             time[k + 1] = time[k] + fall_to_plane(path[k], gravity, site[2], path[k + 1])
-            return k + 2, TOUCHDOWN
+            return k + 2, TOUCHDOWN, limited
         if k == periods:
             break
         seen[:6] = path[k, :6] + navigation
         zem_zev_into(seen, site, gains, remaining, gravity, commanded[k])
         commanded[k] *= path[k, 6]
-        saturate_into(commanded[k], vehicle[0], vehicle[1])
+        if limit_into(commanded[k], vehicle[0], vehicle[1], vehicle[4]):
+            limited += 1
         flown, status = hold_period(
             path[k], commanded[k], thrust_error, period, gravity, vehicle, site[2], path[k + 1]
         )
         time[k + 1] = time[k] + flown
         if status != FLYING:
-            return k + 2, status
-    return periods + 1, FLYING
+            return k + 2, status, limited
+    return periods + 1, FLYING, limited
 
 
 @compile_kernel
@@ -129,8 +137,8 @@ def _fly_plan(
     gravity: NDArray[np.float64],
     vehicle: VehicleNumbers,
     log: _Log,
-) -> tuple[int, int]:
-    """Track a reference for one interval; `timing` = (control period, plane). Returns (nodes, status).
+) -> tuple[int, int, int]:
+    """Track a reference for one interval; `timing` = (control period, plane). Returns as `_fly_zem_zev`.
 
     The engine's error ratio is unknown at the start of the interval; once a period has been flown it is known
     from the change of velocity, which is compared with what the command should have given.
@@ -142,13 +150,14 @@ def _fly_plan(
     periods = commanded.shape[0] - 1
     left = feedforward.shape[0]
     estimate = 0.0
+    limited = 0
     path[0] = start
     time[0] = 0.0
     for k in range(periods + 1):
         if k >= left:
             commanded[k] = 0.0
             time[k + 1] = time[k] + fall_to_plane(path[k], gravity, plane, path[k + 1])
-            return k + 2, TOUCHDOWN
+            return k + 2, TOUCHDOWN, limited
         if k == periods:
             break
         for axis in range(3):
@@ -156,15 +165,16 @@ def _fly_plan(
             push -= gains[0] * (path[k, axis] + navigation[axis] - position[k, axis])
             push -= gains[1] * (path[k, 3 + axis] + navigation[3 + axis] - velocity[k, axis])
             commanded[k, axis] = path[k, 6] * push / (1.0 + estimate)
-        saturate_into(commanded[k], vehicle[0], vehicle[1])
+        if limit_into(commanded[k], vehicle[0], vehicle[1], vehicle[4]):
+            limited += 1
         flown, status = hold_period(
             path[k], commanded[k], thrust_error, period, gravity, vehicle, plane, path[k + 1]
         )
         time[k + 1] = time[k] + flown
         if status != FLYING:
-            return k + 2, status
+            return k + 2, status, limited
         estimate = _estimate_error(path[k], path[k + 1], commanded[k], period, gravity, estimate)
-    return periods + 1, FLYING
+    return periods + 1, FLYING, limited
 
 
 @compile_kernel
@@ -202,7 +212,7 @@ def fly_interval(
     Args:
         state: where the interval starts, above the plane of the decision's site.
         decision: site and command.
-        lander: the vehicle, which saturates the thrust.
+        lander: the vehicle, which limits the thrust.
         gravity: [m/s^2] shape (3,), pointing down.
         interval: (control period [s], control periods to the next look).
         errors: of the applied thrust and of the estimated state over this interval.
@@ -215,20 +225,28 @@ def fly_interval(
     """
     period, periods = interval
     time, path, commanded = np.empty(periods + 2), np.empty((periods + 2, 7)), np.empty((periods + 1, 3))
-    vehicle = (lander.min_thrust, lander.max_thrust, lander.exhaust_velocity, lander.dry_mass)
+    vehicle = (
+        lander.min_thrust,
+        lander.max_thrust,
+        lander.exhaust_velocity,
+        lander.dry_mass,
+        pointing_angle(lander),
+    )
     start, log, command = state.as_array(), (time, path, commanded), decision.command
     drawn = (errors.thrust, errors.navigation)
     if isinstance(command, ZemZevCommand):
         gains = (command.position_gain, command.velocity_gain)
         clock = (command.time_to_go, command.time_to_go_rate, period)
-        nodes, status = _fly_zem_zev(start, decision.site, gains, clock, drawn, gravity, vehicle, log)
+        nodes, status, limited = _fly_zem_zev(
+            start, decision.site, gains, clock, drawn, gravity, vehicle, log
+        )
         left = command.time_to_go - command.time_to_go_rate * float(time[nodes - 1])
     else:
         reference = command.reference
         _check_period(reference.control_period, period)
         parts = (reference.position, reference.velocity, reference.thrust_acceleration)
         timing = (period, float(decision.site[2]))
-        nodes, status = _fly_plan(start, parts, command.gains, timing, drawn, gravity, vehicle, log)
+        nodes, status, limited = _fly_plan(start, parts, command.gains, timing, drawn, gravity, vehicle, log)
         left = reference.duration - float(time[nodes - 1])
     return Segment(
         time=time[:nodes],
@@ -237,6 +255,7 @@ def fly_interval(
         time_to_go=left,
         thrust_error=errors.thrust,
         status=FlightStatus(status),
+        pointing_limited=limited,
     )
 
 

@@ -1,15 +1,16 @@
 """Learning agents: Gymnasium environments, training, shipped weights, and the agents as policies.
 
 Importing this package registers the environments `LunarHDA-v0` and `LunarHDA-Map-v0` with Gymnasium and the
-agents with `hda.registry`. Nothing of torch is imported until something is trained.
+agents with `hda.registry`. Nothing of torch is imported until something is trained. Where nothing has
+imported it, such as in a worker process, `gymnasium.make("rl:LunarHDA-v0")` does.
 """
 
 from typing import TYPE_CHECKING
 
 import gymnasium
 
+import hda
 from guidance.exports import lazy_exports
-from hda.registry import register_policy
 from rl.catalogue import entries
 
 if TYPE_CHECKING:
@@ -45,4 +46,4 @@ __getattr__, __dir__ = lazy_exports(
 gymnasium.register("LunarHDA-v0", entry_point="rl.env:LunarHDAEnv")
 gymnasium.register("LunarHDA-Map-v0", entry_point="rl.env:LunarHDAMapEnv")
 for _entry in entries():
-    register_policy(_entry)
+    hda.register_policy(_entry)

@@ -170,9 +170,12 @@ def make_algorithm(settings: AgentSettings, env: Any, seed: int) -> OffPolicyAlg
         seed: of the first weights, the exploration and the episodes.
 
     Raises:
-        ValueError: unknown algorithm.
+        ValueError: unknown algorithm, or spaces that are not one-dimensional boxes, finite for actions.
         ImportError: `tqc` without sb3-contrib.
     """
+    from rl.box_spaces import check_environment
+
+    check_environment(env)
     if isinstance(settings, RecurrentSettings):
         return make_agent_with_memory(settings, env, seed)
     from stable_baselines3 import DDPG, SAC
@@ -209,5 +212,6 @@ def make_algorithm(settings: AgentSettings, env: Any, seed: int) -> OffPolicyAlg
         algorithm.target_policy_noise = settings.smoothing_noise
         algorithm.target_noise_clip = 2.5 * settings.smoothing_noise
     if settings.algorithm in ("td3", "ddpg"):
-        algorithm.action_noise = NormalActionNoise(np.zeros(5), np.full(5, settings.exploration_noise))
+        still = np.zeros(env.action_space.shape)
+        algorithm.action_noise = NormalActionNoise(still, still + settings.exploration_noise)
     return algorithm

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import fields
 from typing import Any, Generic, TypeVar
 
 import gymnasium
@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from hda.episode import Flight, Step, advance, begin_flight, observe
 from hda.observation import Observation
-from hda.presets import find_preset, sample_scenario
+from hda.outcome import Outcome
+from hda.presets import find_preset
 from hda.scenario import Preset, Scenario
 from rl.action import PAPER_ACTIONS, ActionRanges, decide_action
 from rl.dispersions import Dispersions
@@ -26,31 +27,12 @@ from rl.encoding import (
     encode_flight,
     encode_observation,
 )
+from rl.episode_info import describe_episode
+from rl.episode_source import EpisodeSource
 
 ObsType = TypeVar("ObsType")
 _DISPERSION_NAMES = tuple(entry.name for entry in fields(Dispersions))
 _OPTIONS = ("scenario", *_DISPERSION_NAMES)
-
-
-@dataclass(frozen=True)
-class EpisodeSource:
-    """Which episodes an environment flies.
-
-    Attributes:
-        preset: name of a preset, or a Preset.
-        split: tile split; evaluation belongs to `hda.fly` on the other splits.
-        dispersions: factors on the preset's dispersions.
-    """
-
-    preset: str | Preset = "paper"
-    split: str = "train"
-    dispersions: Dispersions = field(default_factory=Dispersions)
-
-    def scenario(self, study_seed: int, episode: int, changes: dict[str, float]) -> Scenario:
-        """Draw one; `changes` replace single dispersions."""
-        dispersions = replace(self.dispersions, **changes)
-        setting = dispersions.applied(find_preset(self.preset))
-        return sample_scenario(setting, study_seed, episode, self.split)
 
 
 class LandingEnv(gymnasium.Env[ObsType, NDArray[np.float32]], Generic[ObsType]):
@@ -76,8 +58,24 @@ class LandingEnv(gymnasium.Env[ObsType, NDArray[np.float32]], Generic[ObsType]):
     **Options** of `reset`: `scenario`, an `hda.Scenario` to fly instead; and every field of `Dispersions`
     by name (`{"thrust_error": 0.0}`), for this episode only.
 
-    **Info**: `reset` gives the study seed, episode and tile; `step` the reward terms, and at the end the
-    outcome, `is_success` and `safe_site`.
+    **Info** has these keys with these types at reset, at every step and at the end:
+
+    | key | type | meaning |
+    |---|---|---|
+    | `study_seed` | int | of the episode; -1 where it has more than 63 bits |
+    | `episode_number`, `tile` | int | within the study; of the split |
+    | `reward_terms` | dict of float | the step's, by name, each weighted and signed; 0 at reset |
+    | `target_distance` | float | m from the present target; at the end the miss distance |
+    | `speed` | float | m/s; at the end the touchdown speed |
+    | `propellant_fraction` | float | propellant burnt so far over that at the start |
+    | `pointing_limited` | int | control periods so far in which the lander's pointing limit acted |
+    | `ending` | int | 0 in flight, then `rl.episode_info.ENDING_CODES`; 1 is a success |
+    | `is_success`, `safe_site` | bool | false in flight |
+
+    The objects behind them are `env.unwrapped.outcome` (None in flight), `.steps` and `.scenario`.
+
+    **Worker processes** that have not imported `rl` know the environments as `"rl:LunarHDA-v0"` and
+    `"rl:LunarHDA-Map-v0"`: Gymnasium imports what stands before the colon.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 2}  # noqa: RUF012 - Gymnasium declares it so
@@ -93,7 +91,7 @@ class LandingEnv(gymnasium.Env[ObsType, NDArray[np.float32]], Generic[ObsType]):
         """Make the environment; terrain is loaded at the first reset.
 
         Raises:
-            ValueError: unknown preset or render mode.
+            ValueError: unknown preset or render mode, or a split that the preset's terrain does not have.
         """
         if render_mode not in (None, "rgb_array"):
             raise ValueError(f"render_mode must be None or 'rgb_array', got {render_mode!r}")
@@ -138,9 +136,7 @@ class LandingEnv(gymnasium.Env[ObsType, NDArray[np.float32]], Generic[ObsType]):
             raise ValueError(f"a given scenario keeps its dispersions; got also {', '.join(sorted(chosen))}")
         self.scenario = scenario
         self.steps = []
-        streams = scenario.streams
-        info = {"study_seed": streams.study_seed, "episode": streams.episode, "tile": scenario.tile.number}
-        return self._look(begin_flight(scenario)), info
+        return self._look(begin_flight(scenario))
 
     def step(self, action: NDArray[np.float32]) -> tuple[ObsType, float, bool, bool, dict[str, Any]]:
         """Fly one decision.
@@ -149,17 +145,19 @@ class LandingEnv(gymnasium.Env[ObsType, NDArray[np.float32]], Generic[ObsType]):
             ValueError: the action is not five finite numbers.
             gymnasium.error.ResetNeeded: no episode is under way.
         """
-        scenario, flight, seen = self.scenario, self._flight, self._observation
-        if scenario is None or flight is None or seen is None or (self.steps and self.steps[-1].outcome):
+        scenario, flight, look = self.scenario, self._flight, self._observation
+        if scenario is None or flight is None or look is None or self.outcome:
             raise gymnasium.error.ResetNeeded("the episode is over or has not begun: call reset()")
-        step = advance(scenario, flight, decide_action(action, seen, self.action_ranges))
+        step = advance(scenario, flight, decide_action(action, look, self.action_ranges))
         self.steps.append(step)
-        info: dict[str, Any] = {"reward_terms": asdict(step.reward)}
-        if step.outcome is not None:
-            outcome = step.outcome
-            info.update(outcome=outcome, is_success=outcome.success, safe_site=outcome.safe_site)
         terminated = step.outcome is not None and not step.truncated
-        return self._look(step.flight), step.reward.total, terminated, step.truncated, info
+        seen, info = self._look(step.flight)
+        return seen, step.reward.total, terminated, step.truncated, info
+
+    @property
+    def outcome(self) -> Outcome | None:
+        """How the episode ended; None while it goes on."""
+        return self.steps[-1].outcome if self.steps else None
 
     def continue_study(self, study_seed: int, next_episode: int) -> None:
         """Let the next `reset()` without a seed fly this episode of this study."""
@@ -179,11 +177,13 @@ class LandingEnv(gymnasium.Env[ObsType, NDArray[np.float32]], Generic[ObsType]):
 
         return render_flight(self.scenario, self.steps, self._observation)
 
-    def _look(self, flight: Flight) -> ObsType:
+    def _look(self, flight: Flight) -> tuple[ObsType, dict[str, Any]]:
+        """Take the look of this instant: the encoded observation, and the episode's numbers."""
         assert self.scenario is not None
         self._flight = flight
         self._observation = observe(self.scenario, flight)
-        return self.encode(self._observation, self.scenario.nominal_target)
+        seen = self.encode(self._observation, self.scenario.nominal_target)
+        return seen, describe_episode(self.scenario, flight, self.steps)
 
 
 class LunarHDAEnv(LandingEnv[NDArray[np.float32]]):
@@ -220,7 +220,7 @@ class LunarHDAEnv(LandingEnv[NDArray[np.float32]]):
         """Make the environment; the shipped map encoder is loaded.
 
         Raises:
-            ValueError: unknown preset, layout or render mode.
+            ValueError: unknown preset, split, layout or render mode.
             ArtefactError: the encoder's weights are missing or damaged.
         """
         from rl.latent import load_encoder
@@ -261,7 +261,7 @@ class LunarHDAMapEnv(LandingEnv[dict[str, Any]]):
         """Make the environment.
 
         Raises:
-            ValueError: unknown preset or render mode.
+            ValueError: unknown preset, split or render mode.
         """
         super().__init__(preset, split, dispersions, action_ranges, render_mode)
         pixels = find_preset(preset).lidar.pixels

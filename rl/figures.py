@@ -17,6 +17,8 @@ import numpy as np
 import tyro
 from numpy.typing import NDArray
 
+from guidance.console import tolerate_encoding
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
@@ -255,6 +257,7 @@ def _figure(width: float, height: float) -> Figure:
 
 def main() -> None:
     """Command line."""
+    tolerate_encoding()
     command = tyro.cli(Command, description=__doc__)  # type: ignore[call-overload]
     drawers: dict[type, Any] = {
         TrainingFigure: draw_training,

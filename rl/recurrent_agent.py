@@ -9,6 +9,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from rl.box_spaces import check_environment
 from rl.recurrent_hyperparameters import Hyperparameters
 from rl.recurrent_losses import ActorCritic
 from rl.recurrent_networks import NetworkSizes
@@ -57,16 +58,15 @@ class RecurrentAgent:
         """Make it untrained.
 
         Args:
-            env: Gymnasium environment with one-dimensional boxes for observations and actions.
+            env: Gymnasium environment with one-dimensional boxes for observations and actions; those of
+                actions are finite.
             settings: hyperparameters.
             seed: of weights and exploration.
 
         Raises:
-            ValueError: the spaces are not boxes of one dimension.
+            ValueError: the spaces are not such boxes.
         """
-        for name in ("observation_space", "action_space"):
-            if len(getattr(getattr(env, name), "shape", None) or ()) != 1:
-                raise ValueError(f"env must have a one-dimensional Box as {name}, got {getattr(env, name)}")
+        check_environment(env)
         self.settings = settings
         self.observation_space, self.action_space = env.observation_space, env.action_space
         self.sizes = NetworkSizes(
@@ -137,6 +137,7 @@ class RecurrentAgent:
         return AgentMemory.empty(n, self.settings.memory, self.action_space.shape[0])
 
     def _unscaled(self, action: Array) -> Array:
-        """From [-1, 1] to the bounds of the action space."""
+        """From [-1, 1] to the bounds of the action space, in its own type: rounding never leaves it."""
         low, high = self.action_space.low, self.action_space.high
-        return (low + 0.5 * (action + 1.0) * (high - low)).astype(np.float32)
+        own = (low + 0.5 * (action + 1.0) * (high - low)).astype(self.action_space.dtype)
+        return np.clip(own, low, high)

@@ -8,12 +8,14 @@ of the targets.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import torch
 from stable_baselines3 import TD3
 from torch.nn.functional import mse_loss
 
 from rl.action import CONTROLS
+from rl.box_spaces import check_action_space
 
 
 class FastTD3(TD3):
@@ -27,6 +29,16 @@ class FastTD3(TD3):
     """
 
     control_prior: Callable[[], float] | None = None
+
+    def __init__(self, policy: Any, env: Any, *args: Any, **kwargs: Any) -> None:
+        """Make it as Stable-Baselines3 does.
+
+        Raises:
+            ValueError: the actions are not a one-dimensional Box with finite bounds.
+        """
+        if hasattr(env, "action_space"):  # not None, as while loading, nor the name of an environment
+            check_action_space(env.action_space)
+        super().__init__(policy, env, *args, **kwargs)
 
     def train(self, gradient_steps: int, batch_size: int = 100) -> None:
         """Update critics, and every `policy_delay` updates the actor and the targets."""

@@ -70,13 +70,14 @@ class RecurrentTD3(RecurrentAgent):
         """Make it untrained.
 
         Args:
-            env: Gymnasium environment with one-dimensional boxes for observations and actions.
+            env: Gymnasium environment with one-dimensional boxes for observations and actions; those of
+                actions are finite.
             settings: hyperparameters.
             seed: of weights, exploration, sampling and the environment's first reset.
             learning_rate: of Adam, by environment step.
 
         Raises:
-            ValueError: the spaces are not boxes of one dimension.
+            ValueError: the spaces are not such boxes.
         """
         super().__init__(env, settings, seed)
         self.env, self.seed = env, seed

@@ -16,6 +16,7 @@ from typing import Annotated
 
 import tyro
 
+from guidance.console import tolerate_encoding
 from rl.algorithms import RECIPES, RECURRENT_RECIPES, AgentSettings, RecurrentSettings
 from rl.export import ExportWeights, run_export
 from rl.train_autoencoder import TrainAutoencoder, run_autoencoder_training
@@ -115,6 +116,7 @@ def run_agent_training(options: TrainAgent, name: str) -> None:
 
 def main() -> None:
     """Command line."""
+    tolerate_encoding()
     command = tyro.cli(Command, description=__doc__)  # type: ignore[call-overload]
     try:
         if isinstance(command, TrainAutoencoder):

@@ -17,6 +17,8 @@ from typing import Any
 import numpy as np
 import tyro
 
+from guidance.console import tolerate_encoding
+
 
 @dataclass(frozen=True)
 class TrainingSpeed:
@@ -200,6 +202,7 @@ def measure_products(size: int = 1024, rounds: int = 20, precision: str = "highe
 
 def main() -> None:
     """Command line."""
+    tolerate_encoding()
     options = tyro.cli(TrainingSpeed, description=__doc__)
     speeds = measure_training_speed(options)
     reference = speeds["stable-baselines3"]

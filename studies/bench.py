@@ -11,6 +11,7 @@ from rich.console import Console
 from rich.table import Table
 
 from guidance import solve_pdg
+from guidance.console import tolerate_encoding
 from guidance.residuals import fly_residuals
 from guidance.validation import finite_number
 from hda.episode import advance, begin_flight, observe
@@ -106,6 +107,7 @@ def bench(options: Bench) -> None:
 
 def main() -> None:
     """Command line; a wrong option is one line on stderr and exit code 2."""
+    tolerate_encoding()
     options = tyro.cli(Bench, description=__doc__)
     with one_line_errors():
         bench(options)

@@ -20,6 +20,7 @@ from typing import Annotated
 import numpy as np
 import tyro
 
+from guidance.console import tolerate_encoding
 from guidance.validation import finite_number
 from hda.dtm_library import Ground, remove_tiles
 from hda.presets import PRESETS, find_preset, sample_scenario
@@ -246,6 +247,7 @@ def print_ground(preset: Preset) -> None:
 
 def main() -> None:
     """Command line; a wrong option is one line on stderr and exit code 2."""
+    tolerate_encoding()
     options = tyro.cli(Calibration, description=__doc__)
     with one_line_errors():
         calibrate(options)

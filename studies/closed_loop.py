@@ -19,6 +19,7 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
+from guidance.console import tolerate_encoding
 from guidance.soft_landing import DEFAULT_OPTIONS, SoftLandingOptions
 from guidance.validation import finite_number
 from hda.episode import fly
@@ -138,6 +139,7 @@ def sweep(options: Sweep) -> dict[str, list[str]]:
 
 def main() -> None:
     """Command line; a wrong option is one line on stderr and exit code 2."""
+    tolerate_encoding()
     options = tyro.cli(Sweep, description=__doc__)
     with one_line_errors():
         sweep(options)

@@ -16,6 +16,7 @@ import tyro
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+from guidance.console import tolerate_encoding
 from guidance.validation import finite_number
 from hda.own_terrain import OWN_SPLIT
 from hda.presets import find_preset, place_preset
@@ -246,6 +247,7 @@ def report_study(out: Path, content: ReportContent, workers: int) -> None:
 
 def main() -> None:
     """Command line; a wrong option is one line on stderr and exit code 2."""
+    tolerate_encoding()
     options = tyro.cli(Comparison, description=__doc__)
     with resumable():
         compare(options)

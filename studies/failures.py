@@ -18,6 +18,7 @@ import tyro
 from rich.console import Console
 from rich.progress import track
 
+from guidance.console import tolerate_encoding
 from guidance.validation import finite_number
 from hda.episode import fly
 from hda.presets import PRESETS, sample_scenario, unknown_name
@@ -197,6 +198,7 @@ def write_markdown(
 
 def main() -> None:
     """Command line; a wrong option is one line on stderr and exit code 2."""
+    tolerate_encoding()
     with one_line_errors():
         options = tyro.cli(Failures, description=__doc__)
         explained = show_failures(options)

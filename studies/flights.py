@@ -127,6 +127,8 @@ def describe_outcome(record: EpisodeRecord) -> str:
     )
     if record.fallbacks:
         words += f" Its own law gave no answer at {record.fallbacks} of them."
+    if record.pointing_limited:
+        words += f" The pointing limit held its thrust in {record.pointing_limited} control periods."
     return words
 
 

@@ -28,6 +28,7 @@ import numpy as np
 import tyro
 from rich.console import Console
 
+from guidance.console import tolerate_encoding
 from guidance.validation import finite_number
 from hda.presets import find_preset, unknown_name
 from rl.algorithms import RECIPES
@@ -203,6 +204,7 @@ def study_memory(options: MemoryStudy) -> tuple[GroupRow, ...]:
 
 def main() -> None:
     """Command line; a wrong option is one line on stderr and exit code 2."""
+    tolerate_encoding()
     with one_line_errors():
         study_memory(tyro.cli(MemoryStudy, description=__doc__))
 

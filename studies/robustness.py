@@ -20,6 +20,7 @@ import tyro
 from rich.console import Console
 from rich.progress import track
 
+from guidance.console import tolerate_encoding
 from guidance.validation import finite_number
 from hda.dtm_library import Ground, load_tile, tile_numbers
 from hda.episode import fly
@@ -245,6 +246,7 @@ def print_sweeps(sweeps: Sequence[Sweep]) -> None:
 
 def main() -> None:
     """Command line; a wrong option is one line on stderr and exit code 2."""
+    tolerate_encoding()
     with resumable():
         options = tyro.cli(Robustness, description=__doc__)
         print_sweeps(run_robustness(options))

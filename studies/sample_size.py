@@ -16,6 +16,7 @@ import tyro
 from rich.console import Console
 from rich.table import Table
 
+from guidance.console import tolerate_encoding
 from guidance.validation import finite_number
 from studies.command_line import one_line_errors
 from studies.reliability import needed_episodes
@@ -150,6 +151,7 @@ def plan_demonstration() -> Table:
 
 def main() -> None:
     """Command line; a wrong option is one line on stderr and exit code 2."""
+    tolerate_encoding()
     options = tyro.cli(SampleSize, description=__doc__)
     with one_line_errors():
         tables = (plan_comparison(options), plan_demonstration())

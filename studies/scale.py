@@ -20,6 +20,7 @@ import tyro
 from rich.console import Console
 from rich.table import Table
 
+from guidance.console import tolerate_encoding
 from guidance.validation import finite_number
 from hda.registry import policy_entry
 from studies.command_line import one_line_errors
@@ -136,6 +137,7 @@ def tabulate(policy: str, measured: list[Measurement]) -> Table:
 
 def main() -> None:
     """Command line; a wrong option is one line on stderr and exit code 2."""
+    tolerate_encoding()
     options = tyro.cli(Scale, description=__doc__)
     with one_line_errors():
         measure_scale(options)

@@ -19,6 +19,7 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
+from guidance.console import tolerate_encoding
 from guidance.validation import finite_number
 from hda.presets import find_preset
 from hda.scenario import Preset
@@ -138,6 +139,7 @@ def study_stability(options: Stability) -> tuple[list[MarginRow], list[GainRow]]
 
 def main() -> None:
     """Command line; a wrong option is one line on stderr and exit code 2."""
+    tolerate_encoding()
     with one_line_errors():
         study_stability(tyro.cli(Stability, description=__doc__))
 

@@ -18,6 +18,7 @@ import tyro
 from rich.console import Console
 from rich.table import Table
 
+from guidance.console import tolerate_encoding
 from guidance.validation import finite_number
 from studies.command_line import one_line_errors, open_folder
 from studies.timing_conclusions import conclude
@@ -130,6 +131,7 @@ def study_timing(options: Timing) -> list[Summary]:
 
 def main() -> None:
     """Command line; a wrong option is one line on stderr and exit code 2."""
+    tolerate_encoding()
     with one_line_errors():
         study_timing(tyro.cli(Timing, description=__doc__))
 

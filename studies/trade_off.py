@@ -18,6 +18,7 @@ import tyro
 from rich.console import Console
 from rich.progress import track
 
+from guidance.console import tolerate_encoding
 from guidance.validation import finite_number
 from hda.policies.hindsight import could_have_landed, least_propellant
 from hda.presets import find_preset, sample_scenario, unknown_name
@@ -171,6 +172,7 @@ def run_trade_off(options: TradeOff) -> tuple[list[TradeOffRow], list[Bounds]]:
 
 def main() -> None:
     """Command line; a wrong option is one line on stderr and exit code 2."""
+    tolerate_encoding()
     with resumable():
         options = tyro.cli(TradeOff, description=__doc__)
         print_trade_off(*run_trade_off(options))

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from guidance.retarget import shift_landing_point, velocity_change, within_thrust
+from guidance.retarget import shift_landing_point, velocity_change, within_pointing, within_thrust
 from guidance.tracking import TrackingReference, tracking_gains
 from hda.observation import Observation, ScenarioView
 from hda.policies.planned_descent import DescentMemory, PlannedDescent
@@ -19,12 +19,12 @@ class AdjustedDescent:
     """As `PlannedDescent`, but a new site may also be reached by a sideways shift of the plan in flight.
 
     Early, the cheaper of the shifted and the fresh plan flies; late, the shifted one wherever it keeps within
-    the thrust.
+    the thrust and the pointing limit.
 
     Attributes:
         planned: makes and tracks fresh plans.
         adjust_time: [s] with less time left than this no fresh plan is asked for if the shift will do.
-        reserve: share of the thrust that a shifted plan leaves to the feedback.
+        reserve: share of the thrust, and of the pointing limit, that a shifted plan leaves to the feedback.
     """
 
     planned: PlannedDescent = field(default_factory=PlannedDescent)
@@ -44,6 +44,7 @@ class AdjustedDescent:
             return self.planned.command(observation, site, memory)
         shifted = shift_landing_point(left, site, view.gravity)
         possible = within_thrust(shifted, view.lander, observation.state.mass, self.reserve)
+        possible = possible and within_pointing(shifted, view.lander, self.reserve)
         if not possible or left.duration > self.adjust_time:
             fresh = self.planned.command(observation, site, memory)
             if not possible or _is_cheaper(fresh[:2], shifted):

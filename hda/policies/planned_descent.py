@@ -72,8 +72,7 @@ class PlannedDescent:
             return self._track(landing.reference, status, replace(memory, site=site.copy()))
         if left is not None:
             return self._track(left, DecisionStatus.FALLBACK_LAST_PLAN, memory)
-        gravity = FixedGainZemZev().begin(memory.view)
-        command, _, _ = FixedGainZemZev().command(observation, site, gravity)
+        command, _, _ = FixedGainZemZev().command(observation, site, memory.view)
         return command, DecisionStatus.FALLBACK_ZEM_ZEV, replace(memory, site=None, reference=None)
 
     def _plan(

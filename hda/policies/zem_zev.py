@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from guidance.zem_zev import time_to_go
+from guidance.upright_time import upright_time_to_go
 from hda.observation import Observation, ScenarioView
 from hda.policy import DecisionStatus, ZemZevCommand
 
@@ -24,18 +24,17 @@ class FixedGainZemZev:
     position_gain: float = 6.0
     velocity_gain: float = 2.0
 
-    def begin(self, view: ScenarioView) -> tuple[float, float, float]:
-        """Remember gravity."""
-        x, y, z = view.gravity
-        return float(x), float(y), float(z)
+    def begin(self, view: ScenarioView) -> ScenarioView:
+        """Remember the lander and gravity."""
+        return view
 
     def command(
-        self, observation: Observation, site: NDArray[np.float64], memory: tuple[float, float, float]
-    ) -> tuple[ZemZevCommand, DecisionStatus, tuple[float, float, float]]:
-        """Keep the clock for the same site, else ask the quartic."""
+        self, observation: Observation, site: NDArray[np.float64], memory: ScenarioView
+    ) -> tuple[ZemZevCommand, DecisionStatus, ScenarioView]:
+        """Keep the clock for the same site, else ask the quartic, and for longer under a pointing limit."""
         remaining = observation.time_to_go
         if not np.array_equal(site, observation.target):
-            remaining = time_to_go(observation.state, site, memory)
+            remaining = upright_time_to_go(observation.state, site, memory.lander, memory.gravity)
         return (
             ZemZevCommand(self.position_gain, self.velocity_gain, remaining),
             DecisionStatus.NOMINAL,

@@ -221,3 +221,11 @@ def test_thrust_errors_and_noise_of_an_episode_are_its_own_not_the_policys(name,
     for mine, theirs in zip(record.segments, reference.segments, strict=False):
         assert mine.thrust_error == theirs.thrust_error
     assert same(record.observations[0], reference.observations[0])
+
+
+def test_it_never_leans_beyond_the_landers_pointing_limit(name, scenarios):
+    policy, limit = hda.make_policy(name), math.radians(20.0)
+    for scenario in scenarios[7:9]:
+        lander = replace(scenario.preset.lander, pointing_limit=limit)
+        record = fly(policy, replace(scenario, preset=replace(scenario.preset, lander=lander)))
+        assert record.maximum_tilt <= limit + 1e-9

@@ -1,13 +1,15 @@
 """A shifted descent: ends where asked, keeps its time and height, and costs what the quintic says."""
 
+import math
+
 import numpy as np
 import pytest
 from descents import GRAVITY, TARGET
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from guidance import PAPER_LANDER, State
-from guidance.retarget import shift_landing_point, velocity_change, within_thrust
+from guidance import PAPER_LANDER, Lander, State
+from guidance.retarget import shift_landing_point, velocity_change, within_pointing, within_thrust
 from guidance.soft_landing import plan_soft_landing
 from guidance.tracking import TrackingReference, make_reference
 
@@ -64,3 +66,29 @@ def test_thrust_is_judged_at_the_start_mass(descent):
     assert not within_thrust(descent, PAPER_LANDER, 1200.0, spare + 1e-6)
     far = shift_landing_point(descent.after(45), TARGET + np.array([200.0, 0.0, 0.0]), GRAVITY)
     assert not within_thrust(far, PAPER_LANDER, 1200.0, 0.05)
+
+
+def test_a_shift_that_leans_too_far_is_seen():
+    count = 41
+    hover = make_reference(np.tile(TARGET, (count, 1)), np.zeros((count, 3)), PERIOD, GRAVITY)
+    limited = Lander(pointing_limit=math.radians(10.0))
+    reach = math.tan(math.radians(10.0)) * 1.62 * hover.duration**2 / 5.7735
+    for share, kept in ((0.9, True), (1.3, False)):
+        shifted = shift_landing_point(hover, TARGET + np.array([0.0, share * reach, 0.0]), GRAVITY)
+        assert within_pointing(shifted, limited, 0.0) is kept
+        assert within_pointing(shifted, PAPER_LANDER, 0.0)
+    near = shift_landing_point(hover, TARGET + np.array([0.9 * reach, 0.0, 0.0]), GRAVITY)
+    assert not within_pointing(near, limited, 0.4)
+
+
+def test_a_coasting_engine_cannot_shift_sideways_under_a_limit(descent):
+    limited = Lander(pointing_limit=math.radians(60.0))
+    start = State(np.array([200.0, 60.0, 950.0]), np.array([-7.0, -2.0, -25.0]), 1200.0)
+    upright = plan_soft_landing(start, TARGET, limited, PERIOD).reference
+    assert upright is not None
+    assert within_pointing(upright, limited, 0.05)
+    coasts = np.linalg.norm(upright.thrust_acceleration, axis=1) < 0.01
+    assert coasts.sum() > 5
+    shifted = shift_landing_point(upright, TARGET + np.array([30.0, 0.0, 0.0]), GRAVITY)
+    assert not within_pointing(shifted, limited, 0.05)
+    assert not within_pointing(descent, Lander(pointing_limit=math.radians(5.0)), 0.05)

@@ -77,8 +77,52 @@ def test_a_bad_seed_is_named(name, bad):
         EpisodeStreams(**arguments)
 
 
-def test_seeds_that_would_share_streams_are_refused():
-    with pytest.raises(ValueError, match="study_seed must be below"):
-        EpisodeStreams(2**32, 0)
+def test_an_episode_that_is_no_word_is_refused():
     with pytest.raises(ValueError, match="episode must be below"):
         EpisodeStreams(0, 2**32 + 1)
+
+
+def test_no_seed_of_any_size_shares_streams_with_another():
+    """Those whose words run into one another where they are only laid side by side, among others."""
+    seeds = [
+        0,
+        1,
+        2,
+        5,
+        2**32 - 1,
+        2**32,
+        2**32 + 5,
+        2**33,
+        2 * 2**32 + 5,
+        2**40,
+        2**63,
+        2**64,
+        2**64 + 5,
+        2**96,
+    ]
+    seeds += [2**128 + 1, 5 + 2**32 * (1 + 2**32), 5 + 2**64, 1 + 2**32 * 2**32, 2**200 + 17]
+    pairs = {(seed, episode) for seed in seeds for episode in (0, 1, 2, 5, 256, 2**32 - 1)}
+    draws = {}
+    for seed, episode in sorted(pairs):
+        streams = EpisodeStreams(seed, episode)
+        firsts = [streams.scenario().random(), streams.policy().random()]
+        firsts += [streams.thrust_error(k, 0.9) for k in (0, 1, 256)]
+        firsts += [float(streams.look(k, 1)[0, 0]) for k in (0, 1, 2)]
+        for first in firsts:
+            assert draws.setdefault(first, (seed, episode)) == (seed, episode)
+    assert len(draws) == 8 * len(pairs)
+
+
+@given(seed=st.integers(2**32, 2**130), episode=EPISODES)
+def test_a_large_seed_is_its_low_word_the_episode_and_the_counted_rest(seed, episode):
+    rest = [int(word, 16) for word in _words(seed)[1:]]
+    entropy = [seed & 0xFFFFFFFF, episode, len(rest), *rest]
+    expected = np.random.default_rng(np.random.SeedSequence(entropy).spawn(4)[SCENARIO])
+    assert EpisodeStreams(seed, episode).scenario().random() == expected.random()
+
+
+def _words(number: int) -> list[str]:
+    """Words of 32 bits in hexadecimal, the lowest first."""
+    digits = f"{number:x}"
+    digits = digits.zfill(-(-len(digits) // 8) * 8)
+    return [digits[k : k + 8] for k in range(0, len(digits), 8)][::-1]

@@ -1,5 +1,7 @@
 """Policies by name."""
 
+import subprocess
+import sys
 from dataclasses import replace
 from typing import Any
 
@@ -59,6 +61,31 @@ def test_an_unknown_name_suggests_the_nearest(wrong, meant):
         hda.make_policy(wrong)
     with pytest.raises(ValueError, match=r"valid: .*single-divert"):
         policy_entry(wrong)
+
+
+def without_rl(name: str) -> str:
+    """What asking for a policy says in a process that has imported `hda` alone."""
+    code = f"import hda\ntry:\n    hda.make_policy({name!r})\nexcept ValueError as error:\n    print(error)"
+    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+
+
+@pytest.mark.parametrize("name", ["td3", "td3-lstm-plus", "sac", "td3-lsm"])
+def test_an_agent_that_nobody_registered_says_how_it_is(name):
+    assert without_rl(name).strip().endswith("`import rl` registers the agents")
+
+
+def test_other_unknown_names_have_no_word_of_agents():
+    assert "import rl" not in without_rl("orakle")
+    assert "import rl" not in without_rl("xyzzy")
+    with pytest.raises(ValueError, match="unknown policy") as caught:
+        hda.make_policy("td3-lsm")  # here rl is imported
+    assert "import rl" not in str(caught.value)
+
+
+def test_the_names_of_agents_are_those_that_rl_registers():
+    from rl.catalogue import entries
+
+    assert sorted(registry.AGENTS) == sorted(entry.name for entry in entries())
 
 
 @pytest.mark.parametrize("wrong", ["", "xyzzy", 7, None])

@@ -125,7 +125,7 @@ def test_after_the_cut_off_the_vehicle_falls_as_galileo_says(height, climb, drif
 
 def hold(state: State, thrust, duration: float, error: float = 0.0, lander: Lander = PAPER_LANDER):
     """hold_period with plain arguments: (time flown, status, state reached)."""
-    vehicle = (lander.min_thrust, lander.max_thrust, lander.exhaust_velocity, lander.dry_mass)
+    vehicle = (lander.min_thrust, lander.max_thrust, lander.exhaust_velocity, lander.dry_mass, math.pi)
     out = np.empty(7)
     flown, status = hold_period(
         state.as_array(), np.array(thrust, dtype=float), error, duration, GRAVITY, vehicle, PLANE, out

@@ -20,6 +20,7 @@ from rl.action import decide_action
 from rl.dispersions import Dispersions
 from rl.encoding import CURVED, PRINTED, RELATIVE
 from rl.env import LunarHDAEnv, LunarHDAMapEnv
+from rl.episode_info import ENDING_CODES
 
 IDS = ("LunarHDA-v0", "LunarHDA-Map-v0")
 
@@ -82,10 +83,30 @@ def test_a_rollout_equals_fly_exactly(preset, seed):
         assert reward == record.rewards[k].total
         assert (terminated or truncated) == (k == len(record.observations) - 1)
         np.testing.assert_array_equal(env.steps[k].segment.path, record.segments[k].path)
-    assert info["outcome"].ending == record.outcome.ending
-    np.testing.assert_array_equal(info["outcome"].touchdown, record.outcome.touchdown)
+    assert env.outcome is not None
+    assert env.outcome.ending == record.outcome.ending
+    np.testing.assert_array_equal(env.outcome.touchdown, record.outcome.touchdown)
+    assert info["ending"] == ENDING_CODES[record.outcome.ending]
+    assert info["target_distance"] == record.outcome.miss_distance
+    assert info["speed"] == record.outcome.touchdown_speed
+    assert info["propellant_fraction"] == record.outcome.propellant_fraction
     assert info["is_success"] == record.outcome.success
     assert info["safe_site"] == record.outcome.safe_site
+
+
+def test_a_rollout_keeps_the_landers_pointing_limit_as_fly_does():
+    upright = replace(PRESETS["paper"].lander, pointing_limit=math.radians(15.0))
+    preset = replace(PRESETS["paper"], lander=upright)
+    scenario = sample_scenario(preset, 5, 1, "train")
+    actions = random_actions(1)
+    record = fly(ScriptedPolicy(actions), scenario)
+    env = LunarHDAMapEnv(preset)
+    env.reset(options={"scenario": scenario})
+    for k, segment in enumerate(record.segments):
+        env.step(actions[k])
+        np.testing.assert_array_equal(env.steps[k].segment.path, segment.path)
+    assert sum(step.segment.pointing_limited for step in env.steps) == record.pointing_limited > 0
+    assert record.maximum_tilt == pytest.approx(math.radians(15.0), abs=1e-9)
 
 
 def test_seeded_episodes_are_those_of_sample_scenario():
@@ -93,7 +114,11 @@ def test_seeded_episodes_are_those_of_sample_scenario():
     for episode in range(3):
         _, info = env.reset(seed=11 if episode == 0 else None)
         scenario = sample_scenario("paper", 11, episode, "train")
-        assert (info["study_seed"], info["episode"], info["tile"]) == (11, episode, scenario.tile.number)
+        assert (info["study_seed"], info["episode_number"], info["tile"]) == (
+            11,
+            episode,
+            scenario.tile.number,
+        )
         assert env.scenario is not None
         np.testing.assert_array_equal(
             env.scenario.initial_state.as_array(), scenario.initial_state.as_array()
@@ -169,7 +194,7 @@ def test_rewards_are_those_of_score_step():
         _, reward, terminated, truncated, info = env.step(np.zeros(5, dtype=np.float32))
         after = env.steps[-1].flight.state.mass
         burnt = (mass - after) / (start.mass - PRESETS["paper"].lander.dry_mass)
-        terms = score_step(burnt, info.get("outcome"))
+        terms = score_step(burnt, env.outcome)
         assert reward == pytest.approx(terms.total, abs=1e-12)
         assert sum(info["reward_terms"].values()) == pytest.approx(reward, abs=1e-12)
         mass, over = after, terminated or truncated
