@@ -171,7 +171,7 @@ def _within_limits(plan: Plan, plan_again: Callable[[int, Plan], Plan]) -> Plan:
         plan: a plan with a flight.
         plan_again: (nodes, plan found so far) -> plan.
     """
-    before = math.inf
+    before, stalls = math.inf, 0
     while plan.status.has_flight:
         if plan.keeps_limits:
             return plan
@@ -182,7 +182,8 @@ def _within_limits(plan: Plan, plan_again: Callable[[int, Plan], Plan]) -> Plan:
         missed = Plan(PlanStatus.LIMIT_REACHED, plan.problem, plan.method, message=words, solves=plan.solves)
         # a relaxed thrust that turns round does so within one interval of any mesh
         turns = worst == "thrust_dip" and plan.method != "casadi"
-        if finer > MOST_NODES or turns or worst not in _CURED_BY_NODES or excess[worst] > 0.7 * before:
+        stalls = stalls + 1 if excess[worst] > 0.7 * before else 0
+        if finer > MOST_NODES or turns or worst not in _CURED_BY_NODES or stalls == 2:
             return missed
         before = excess[worst]
         again = plan_again(finer, plan)
