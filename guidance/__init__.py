@@ -9,11 +9,10 @@ from guidance.exports import lazy_exports
 
 if TYPE_CHECKING:
     from guidance.constants import MOON_GRAVITY, STANDARD_GRAVITY
+    from guidance.descent.plan import GuidanceError, InfeasibleError, Plan, PlanStatus, SolverFailedError
     from guidance.dynamics import propagate
-    from guidance.errors import GuidanceError, InfeasibleError, SolverFailedError
     from guidance.lander import PAPER_LANDER, Lander
-    from guidance.pdg import solve_pdg
-    from guidance.plan import Plan, PlanStatus
+    from guidance.pdg.solve import solve_pdg
     from guidance.state import State
     from guidance.zem_zev import saturate_thrust, time_to_go, zem_zev_acceleration
 
@@ -41,16 +40,16 @@ __getattr__, __dir__ = lazy_exports(
         "MOON_GRAVITY": "guidance.constants",
         "PAPER_LANDER": "guidance.lander",
         "STANDARD_GRAVITY": "guidance.constants",
-        "GuidanceError": "guidance.errors",
-        "InfeasibleError": "guidance.errors",
+        "GuidanceError": "guidance.descent.plan",
+        "InfeasibleError": "guidance.descent.plan",
         "Lander": "guidance.lander",
-        "Plan": "guidance.plan",
-        "PlanStatus": "guidance.plan",
-        "SolverFailedError": "guidance.errors",
+        "Plan": "guidance.descent.plan",
+        "PlanStatus": "guidance.descent.plan",
+        "SolverFailedError": "guidance.descent.plan",
         "State": "guidance.state",
         "propagate": "guidance.dynamics",
         "saturate_thrust": "guidance.zem_zev",
-        "solve_pdg": "guidance.pdg",
+        "solve_pdg": "guidance.pdg.solve",
         "time_to_go": "guidance.zem_zev",
         "zem_zev_acceleration": "guidance.zem_zev",
     },

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Protocol, TypeVar, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from guidance.tracking import TrackingReference
+from guidance.tracking.reference import TrackingReference
 from guidance.validation import finite_number, finite_vector
 from hda.observation import Observation, ScenarioView
 

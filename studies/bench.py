@@ -12,7 +12,7 @@ from rich.table import Table
 
 from guidance import solve_pdg
 from guidance.console import tolerate_encoding
-from guidance.residuals import fly_residuals
+from guidance.descent.residuals import fly_residuals
 from guidance.validation import finite_number
 from hda.episode import advance, begin_flight, observe
 from hda.policy import PrivilegedPolicy

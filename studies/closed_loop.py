@@ -20,7 +20,7 @@ from rich.progress import track
 from rich.table import Table
 
 from guidance.console import tolerate_encoding
-from guidance.soft_landing import DEFAULT_OPTIONS, SoftLandingOptions
+from guidance.tracking.soft_landing import DEFAULT_OPTIONS, SoftLandingOptions
 from guidance.validation import finite_number
 from hda.episode import fly
 from hda.policies.composition import ComposedPolicy, GuidanceLaw

@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from guidance import InfeasibleError, Lander, Plan, SolverFailedError, State, solve_pdg
-from guidance.nonlinear_program import NonlinearSolver, fatrop_present
-from guidance.pdg import DEFAULT_NODES
-from guidance.problem import LandingProblem
-from guidance.reference_casadi import plan_casadi
+from guidance.descent.problem import LandingProblem
+from guidance.pdg.solve import DEFAULT_NODES
+from guidance.reference.casadi_planner import plan_casadi
+from guidance.reference.nonlinear_program import NonlinearSolver, fatrop_present
 from hda.presets import sample_scenario
 from studies.timing_peer import gfold_present, plan_gfold
 
@@ -165,7 +165,7 @@ def _by_cvxpy(problem: LandingProblem, nodes: int, time_of_flight: float | None)
 
 def _forget_cvxpy_model() -> None:
     """Drop the compiled models, so that the next call states and compiles its problem anew."""
-    from guidance import reference_cvxpy
+    from guidance.reference import cvxpy_planner as reference_cvxpy
 
     reference_cvxpy.forget_models()
 

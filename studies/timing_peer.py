@@ -18,9 +18,10 @@ from typing import Any
 
 import numpy as np
 
-from guidance.plan import Plan, PlanStatus
-from guidance.problem import LandingProblem
-from guidance.time_window import time_window
+from guidance.descent.plan import Plan, PlanStatus
+from guidance.descent.problem import LandingProblem
+from guidance.descent.trajectory import Trajectory
+from guidance.flight_time.time_window import time_window
 
 FREE_TIME_SOLVES = 36
 """A sweep of 13 times, golden section with 2 + 20, and the last one: fixed in its source."""
@@ -85,11 +86,12 @@ def plan_gfold(problem: LandingProblem, nodes: int, time_of_flight: float | None
         status = PlanStatus.INFEASIBLE if refused else PlanStatus.SOLVER_FAILED
         return Plan(status, problem, "gfold", message=str(error), solves=solves)
     mass = np.exp(np.array(answer.z_values))
-    flight = {
-        "time": np.array(answer.time_points),
-        "position": np.array(answer.positions) + problem.target,
-        "velocity": np.array(answer.velocities),
-        "mass": mass,
-        "thrust": np.array(answer.u_values) * mass[:, None],
-    }
+    flight = Trajectory(
+        np.array(answer.time_points),
+        np.array(answer.positions) + problem.target,
+        np.array(answer.velocities),
+        mass,
+        np.array(answer.u_values) * mass[:, None],
+        problem.lander.exhaust_velocity,
+    )
     return Plan.of_flight(PlanStatus.OPTIMAL, problem, "gfold", flight, solves)

@@ -34,7 +34,7 @@ def run(command: list[str], encoding: str) -> subprocess.CompletedProcess[bytes]
 
 
 def test_every_command_begins_with_it():
-    """`main`, or where there is none what the guard runs; `guidance.pdg` has its main next door."""
+    """`main`, or where there is none what the guard runs; `guidance.pdg.solve` has its main next door."""
     found = commands()
     assert len(found) > 15
     for path in found:

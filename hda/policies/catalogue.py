@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from guidance.soft_landing import SoftLandingOptions
+from guidance.tracking.soft_landing import SoftLandingOptions
 from hda.policies.adjusted_descent import AdjustedDescent
 from hda.policies.composition import ComposedPolicy, PrivilegedComposition
 from hda.policies.deferred_decision import DeferredDecisionPolicy

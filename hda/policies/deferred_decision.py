@@ -13,10 +13,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from guidance.deferred_decision import DeferredDecision, plan_deferred
-from guidance.plan import PlanStatus
-from guidance.soft_landing import SoftLanding, plan_soft_landing, sample_descent
-from guidance.tracking import TrackingReference, tracking_gains
+from guidance.descent.plan import PlanStatus
+from guidance.planning.deferred_decision import DeferredDecision, plan_deferred
+from guidance.tracking.reference import TrackingReference, tracking_gains
+from guidance.tracking.soft_landing import SoftLanding, plan_soft_landing, sample_descent
 from guidance.validation import finite_number
 from hda.belief import SafetyBelief
 from hda.observation import Observation, ScenarioView

@@ -8,11 +8,11 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from guidance.descent.plan import PlanStatus
 from guidance.lander import Lander
-from guidance.plan import PlanStatus
-from guidance.soft_landing import DEFAULT_OPTIONS, SoftLanding, SoftLandingOptions, plan_soft_landing
 from guidance.state import State
-from guidance.tracking import DEFAULT_WEIGHTS, TrackingReference, TrackingWeights, tracking_gains
+from guidance.tracking.reference import DEFAULT_WEIGHTS, TrackingReference, TrackingWeights, tracking_gains
+from guidance.tracking.soft_landing import DEFAULT_OPTIONS, SoftLanding, SoftLandingOptions, plan_soft_landing
 from hda.observation import Observation, ScenarioView
 from hda.policies.zem_zev import FixedGainZemZev
 from hda.policy import Command, DecisionStatus, PlanCommand

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from guidance import PAPER_LANDER, Lander, State
-from guidance.problem import LandingProblem
+from guidance.descent.problem import LandingProblem
 
 TARGET = np.array([0.0, 0.0, 50.0])
 GRAVITY = np.array([0.0, 0.0, -1.62])

@@ -10,12 +10,12 @@ from hypothesis import strategies as st
 
 import guidance
 from guidance import PAPER_LANDER, Lander, PlanStatus, State, propagate
-from guidance.certificate import FarkasProof
-from guidance.infeasibility import prove_at
-from guidance.minimum_propellant import ConvexTask
-from guidance.pdg import METHODS
-from guidance.problem import LandingProblem
-from guidance.time_window import forbidden_by, guess_time, time_window
+from guidance.descent.certificate import FarkasProof
+from guidance.descent.problem import LandingProblem
+from guidance.flight_time.time_window import forbidden_by, guess_time, time_window
+from guidance.pdg.solve import METHODS
+from guidance.planning.infeasibility import prove_at
+from guidance.planning.minimum_propellant import ConvexTask
 
 START = [180.0, 120.0, 940.0, -7.0, -4.0, -28.0, 1200.0]
 

@@ -7,9 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from test_flight_time import Sample, hyperbola
 
-from guidance.bracket_search import BracketSearch
-from guidance.flight_time import TimeModel
-from guidance.time_window import TimeWindow
+from guidance.flight_time.bracket_search import BracketSearch
+from guidance.flight_time.search import TimeModel
+from guidance.flight_time.time_window import TimeWindow
 
 TOLERANCE = 1e-4
 

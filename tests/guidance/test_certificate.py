@@ -8,10 +8,10 @@ from descents import FEASIBLE, GRAVITY, TARGET, arguments, problem_of
 
 import guidance
 from guidance import PAPER_LANDER, InfeasibleError, PlanStatus, State
-from guidance.certificate import Certificate, FarkasProof
-from guidance.infeasibility import prove_at, prove_fixed_time, prove_free_time
-from guidance.minimum_propellant import ConvexTask
-from guidance.problem import LandingProblem
+from guidance.descent.certificate import Certificate, FarkasProof
+from guidance.descent.problem import LandingProblem
+from guidance.planning.infeasibility import prove_at, prove_fixed_time, prove_free_time
+from guidance.planning.minimum_propellant import ConvexTask
 
 START = [180.0, 120.0, 940.0, -7.0, -4.0, -28.0, 1200.0]
 

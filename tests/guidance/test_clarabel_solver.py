@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.sparse import csc_matrix, csr_matrix
 
-from guidance.clarabel_solver import ConicSolver, SolveStatus
+from guidance.convex.clarabel_solver import ConicSolver, SolveStatus
 
 CONES = (("nonnegative", 2),)
 COST = np.array([1.0, 2.0])

@@ -8,16 +8,17 @@ from descents import FEASIBLE, GRAVITY, TARGET, feasible_start, harsh_start, pap
 from hypothesis import given
 from hypothesis import strategies as st
 
-from guidance import PAPER_LANDER, State, constraints
-from guidance.clarabel_solver import SolveStatus
-from guidance.condensed import CondensedLayout, burnt_mass, expand, keeps_altitude, landing_moments
-from guidance.constraint_set import ConstraintSet
-from guidance.convex import convex_template
-from guidance.layout import Layout
-from guidance.minimum_propellant import ConvexTask
-from guidance.problem import LandingProblem
-from guidance.scaling import scale_problem
-from guidance.time_window import guess_time, time_window
+from guidance import PAPER_LANDER, State
+from guidance.convex import constraints
+from guidance.convex.clarabel_solver import SolveStatus
+from guidance.convex.condensed import CondensedLayout, burnt_mass, expand, keeps_altitude, landing_moments
+from guidance.convex.constraint_set import ConstraintSet
+from guidance.convex.layout import Layout
+from guidance.convex.programme import convex_template
+from guidance.convex.scaling import scale_problem
+from guidance.descent.problem import LandingProblem
+from guidance.flight_time.time_window import guess_time, time_window
+from guidance.planning.minimum_propellant import ConvexTask
 
 NODES = 31
 

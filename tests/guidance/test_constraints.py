@@ -5,13 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from guidance import Lander, State, constraints
-from guidance.condensed import CondensedLayout, burnt_mass, landing_moments
-from guidance.convex import Family
+from guidance import Lander, State
+from guidance.convex import constraints
+from guidance.convex.condensed import CondensedLayout, burnt_mass, landing_moments
+from guidance.convex.layout import Layout
+from guidance.convex.programme import Family
+from guidance.convex.scaling import least_log_mass, outer_mass_bounds, scale_problem, tangent_mass_bounds
+from guidance.descent.problem import LandingProblem
 from guidance.dynamics import integrate
-from guidance.layout import Layout
-from guidance.problem import LandingProblem
-from guidance.scaling import least_log_mass, outer_mass_bounds, scale_problem, tangent_mass_bounds
 
 NODES = 7
 LAYOUT = Layout(NODES)

@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 from descents import CASES, FEASIBLE, TARGET, paper_start, problem_of
 
-from guidance import PAPER_LANDER, Lander, State, constraints
+from guidance import PAPER_LANDER, Lander, State
 from guidance.constants import MOON_GRAVITY
-from guidance.constraint_set import ConstraintSet
-from guidance.convex import ConvexTemplate
-from guidance.minimum_propellant import ConvexTask
-from guidance.problem import LandingProblem
-from guidance.scaling import scale_problem
+from guidance.convex import constraints
+from guidance.convex.constraint_set import ConstraintSet
+from guidance.convex.programme import ConvexTemplate
+from guidance.convex.scaling import scale_problem
+from guidance.descent.problem import LandingProblem
+from guidance.planning.minimum_propellant import ConvexTask
 
 NODES = 31
 NAMES = [case["name"] for case in FEASIBLE]

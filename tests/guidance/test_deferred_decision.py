@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from guidance import Lander, State
-from guidance.deferred_decision import plan_deferred
-from guidance.minimum_propellant import ConvexTask
-from guidance.problem import LandingProblem
+from guidance.descent.problem import LandingProblem
+from guidance.planning.deferred_decision import plan_deferred
+from guidance.planning.minimum_propellant import ConvexTask
 
 TIME = 24.5
 NODES = 21

@@ -10,11 +10,11 @@ from field_descents import KINDS
 from scipy.optimize import brentq
 
 from guidance import Lander, PlanStatus, State, solve_pdg
-from guidance.certificate import Certificate
+from guidance.descent.certificate import Certificate
+from guidance.descent.plan import Plan
+from guidance.descent.residuals import RESIDUAL_UNITS, fly_plan
 from guidance.dynamics import integrate, propagate
-from guidance.pdg_command import main
-from guidance.plan import Plan
-from guidance.residuals import RESIDUAL_UNITS, fly_plan
+from guidance.pdg.__main__ import main
 
 ORIGIN = (0.0, 0.0, 0.0)
 EDGE_CASES = {
@@ -114,7 +114,7 @@ def test_a_long_flight_does_not_pass_under_the_ground(nodes):
 
 
 def test_a_plan_that_no_mesh_mends_is_none(monkeypatch):
-    monkeypatch.setattr("guidance.pdg.MOST_NODES", 100)
+    monkeypatch.setattr("guidance.pdg.solve.MOST_NODES", 100)
     plan = solve_pdg(
         [-420000, 0, 15000, 1673, 0, 0, 15200],
         ORIGIN,

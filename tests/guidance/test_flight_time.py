@@ -10,10 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from guidance import PAPER_LANDER, State
-from guidance.flight_time import TimeModel, TimeSearch
-from guidance.minimum_propellant import ConvexTask, minimise_over_time
-from guidance.problem import LandingProblem
-from guidance.time_window import TimeWindow, guess_time, time_window
+from guidance.descent.problem import LandingProblem
+from guidance.flight_time.search import TimeModel, TimeSearch
+from guidance.flight_time.time_window import TimeWindow, guess_time, time_window
+from guidance.planning.minimum_propellant import ConvexTask, minimise_over_time
 
 
 @dataclass(frozen=True)

@@ -20,8 +20,8 @@ from descents import (
 
 import guidance
 from guidance import InfeasibleError, Lander, PlanStatus, SolverFailedError, State
-from guidance.clarabel_solver import ConicSolver
-from guidance.pdg import METHODS, time_left
+from guidance.convex.clarabel_solver import ConicSolver
+from guidance.pdg.solve import METHODS, time_left
 
 NAMES = [case["name"] for case in FEASIBLE]
 START = [180.0, 120.0, 940.0, -7.0, -4.0, -28.0, 1200.0]
@@ -231,7 +231,7 @@ def test_a_broken_solver_is_a_status_not_an_exception(monkeypatch):
 
     solve = ConicSolver.solve
     monkeypatch.setattr(ConicSolver, "solve", broken)
-    monkeypatch.setattr("guidance.convex._CACHE.templates", {})
+    monkeypatch.setattr("guidance.convex.programme._CACHE.templates", {})
     plan = guidance.solve_pdg(START, TARGET, throw=False)
     assert plan.status in (PlanStatus.SOLVER_FAILED, PlanStatus.LIMIT_REACHED)
     assert plan.certificate is None

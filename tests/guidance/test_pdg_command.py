@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from guidance.pdg_command import main
+from guidance.pdg.__main__ import main
 
 STATE = ["--state", "200", "100", "950", "-8", "-4", "-30", "1200", "--target", "0", "0", "50"]
 ROOT = Path(__file__).parents[2]

@@ -9,7 +9,7 @@ from descents import FEASIBLE, TARGET, arguments
 
 import guidance
 from guidance import Plan, PlanStatus
-from guidance.plan_figure import draw_plan, save_plan_figure
+from guidance.descent.picture import draw_plan, save_plan_figure
 
 START = [180.0, 120.0, 940.0, -7.0, -4.0, -28.0, 1200.0]
 

@@ -12,12 +12,12 @@ from hypothesis import strategies as st
 
 import guidance
 from guidance import PAPER_LANDER, Lander, PlanStatus, State
+from guidance.descent.problem import LandingProblem
 from guidance.dynamics import integrate
-from guidance.flight_time import TimeModel, TimeSearch
-from guidance.minimum_propellant import ConvexTask, minimise_over_time
-from guidance.primer_vector import PrimerFlight, find_primer_flight
-from guidance.problem import LandingProblem
-from guidance.time_window import guess_time, time_window
+from guidance.flight_time.primer_vector import PrimerFlight, find_primer_flight
+from guidance.flight_time.search import TimeModel, TimeSearch
+from guidance.flight_time.time_window import guess_time, time_window
+from guidance.planning.minimum_propellant import ConvexTask, minimise_over_time
 
 START = [180.0, 120.0, 940.0, -7.0, -4.0, -28.0, 1200.0]
 NODES = 61

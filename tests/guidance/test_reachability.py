@@ -7,8 +7,8 @@ import pytest
 from descents import GRAVITY
 
 from guidance import PAPER_LANDER, PlanStatus, State, solve_pdg
-from guidance.problem import LandingProblem
-from guidance.reachability import DEFAULT_NODES, ReachableSet, reachable_set
+from guidance.descent.problem import LandingProblem
+from guidance.planning.reachability import DEFAULT_NODES, ReachableSet, reachable_set
 
 PLANE = np.array([0.0, 0.0, 50.0])
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import guidance
-from guidance.problem import LandingProblem
-from guidance.reference_casadi import plan_casadi
+from guidance.descent.problem import LandingProblem
+from guidance.reference.casadi_planner import plan_casadi
 
 RUN = "import sys, guidance; {code}; print(*sorted(m for m in sys.modules), sep='\\n')"
 
@@ -32,8 +32,8 @@ def test_convex_solver_uses_neither_reference_nor_their_libraries():
     assert not loaded & {
         "cvxpy",
         "casadi",
-        "guidance.reference_cvxpy",
-        "guidance.reference_casadi",
+        "guidance.reference.cvxpy_planner",
+        "guidance.reference.casadi_planner",
         "matplotlib",
     }
 
@@ -41,19 +41,24 @@ def test_convex_solver_uses_neither_reference_nor_their_libraries():
 @pytest.mark.parametrize("name", ["cvxpy", "casadi"])
 def test_references_use_nothing_of_the_convex_solver(name):
     loaded = modules_after(f"import guidance.reference_{name} as r; r.plan_{name}")
-    mine = {"guidance.convex", "guidance.constraints", "guidance.scaling", "guidance.minimum_propellant"}
-    assert not loaded & (mine | {"guidance.convex_planner", "guidance.layout"})
+    mine = {
+        "guidance.convex.programme",
+        "guidance.convex.constraints",
+        "guidance.convex.scaling",
+        "guidance.planning.minimum_propellant",
+    }
+    assert not loaded & (mine | {"guidance.planning.convex_planner", "guidance.convex.layout"})
 
 
 def test_cvxpy_model_is_disciplined_parametrised():
-    from guidance.reference_cvxpy import _model
+    from guidance.reference.cvxpy_planner import _model
 
     problem, _, _ = _model(11, (True, True, True, True))
     assert problem.is_dcp(dpp=True)
 
 
 def test_references_count_their_solves_and_forget_on_demand():
-    from guidance import reference_cvxpy
+    from guidance.reference import cvxpy_planner as reference_cvxpy
 
     start, target = [180.0, 120.0, 940.0, -7.0, -4.0, -28.0, 1200.0], [0.0, 0.0, 50.0]
     fixed = guidance.solve_pdg(start, target, method="cvxpy", nodes=15, time_of_flight=29.0)
@@ -95,7 +100,8 @@ def test_limits_that_fatrop_does_not_solve_reliably_go_to_ipopt(limits):
 @pytest.mark.parametrize("breakage", ["gives up", "raises", "is absent"])
 def test_ipopt_takes_over_where_fatrop_fails(monkeypatch, breakage):
     """Labelled and counted; and the same plan as IPOPT alone."""
-    from guidance import nonlinear_program, reference_casadi
+    from guidance.reference import casadi_planner as reference_casadi
+    from guidance.reference import nonlinear_program
 
     whole = reference_casadi.nonlinear_program
 

@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from guidance import PAPER_LANDER, Lander, State
-from guidance.retarget import shift_landing_point, velocity_change, within_pointing, within_thrust
-from guidance.soft_landing import plan_soft_landing
-from guidance.tracking import TrackingReference, make_reference
+from guidance.tracking.reference import TrackingReference, make_reference
+from guidance.tracking.retarget import shift_landing_point, velocity_change, within_pointing, within_thrust
+from guidance.tracking.soft_landing import plan_soft_landing
 
 PERIOD = 0.5
 

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 import guidance
 from guidance import PAPER_LANDER, Lander, PlanStatus, State
-from guidance.pdg import ARRIVED, METHODS
-from guidance.problem import ROUNDING, LandingProblem, lies_below
-from guidance.soft_landing import DEFAULT_OPTIONS, plan_soft_landing
+from guidance.descent.problem import ROUNDING, LandingProblem, lies_below
+from guidance.pdg.solve import ARRIVED, METHODS
+from guidance.tracking.soft_landing import DEFAULT_OPTIONS, plan_soft_landing
 
 
 def problem_from(start, target=TARGET, **limits):

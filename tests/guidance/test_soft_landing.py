@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 
+from guidance.descent.plan import PlanStatus
 from guidance.dynamics import propagate
 from guidance.lander import PAPER_LANDER
-from guidance.plan import PlanStatus
-from guidance.soft_landing import SoftLandingOptions, plan_soft_landing
 from guidance.state import State
+from guidance.tracking.soft_landing import SoftLandingOptions, plan_soft_landing
 from guidance.zem_zev import saturate_thrust
 
 PERIOD = 0.5

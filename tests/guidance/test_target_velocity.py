@@ -10,15 +10,15 @@ from hypothesis import strategies as st
 
 import guidance
 from guidance import PAPER_LANDER, Lander, PlanStatus, State, propagate
-from guidance.deferred_decision import plan_deferred
-from guidance.minimum_propellant import ConvexTask
-from guidance.pdg import METHODS
-from guidance.primer_vector import find_primer_flight
-from guidance.problem import LandingProblem
-from guidance.reachability import reachable_set
-from guidance.retarget import shift_landing_point
-from guidance.time_window import guess_time, time_window
-from guidance.tracking import make_reference, states_at
+from guidance.descent.problem import LandingProblem
+from guidance.flight_time.primer_vector import find_primer_flight
+from guidance.flight_time.time_window import guess_time, time_window
+from guidance.pdg.solve import METHODS
+from guidance.planning.deferred_decision import plan_deferred
+from guidance.planning.minimum_propellant import ConvexTask
+from guidance.planning.reachability import reachable_set
+from guidance.tracking.reference import make_reference, states_at
+from guidance.tracking.retarget import shift_landing_point
 
 START = [180.0, 120.0, 940.0, -7.0, -4.0, -28.0, 1200.0]
 VELOCITY = np.array([4.0, -3.0, -12.0])

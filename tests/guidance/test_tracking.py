@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from guidance.pdg import solve_pdg
-from guidance.tracking import (
+from guidance.pdg.solve import solve_pdg
+from guidance.tracking.reference import (
     TrackingReference,
     TrackingWeights,
     make_reference,

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from guidance.retarget import velocity_change
 from guidance.state import State
+from guidance.tracking.retarget import velocity_change
 from hda.episode import begin_flight, observe
 from hda.observation import Observation
 from hda.policies.adjusted_descent import AdjustedDescent

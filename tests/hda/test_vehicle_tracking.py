@@ -5,9 +5,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from guidance.lander import PAPER_LANDER
-from guidance.soft_landing import plan_soft_landing
 from guidance.state import State
-from guidance.tracking import TrackingReference, make_reference
+from guidance.tracking.reference import TrackingReference, make_reference
+from guidance.tracking.soft_landing import plan_soft_landing
 from hda.policy import Decision, PlanCommand
 from hda.vehicle import FlightErrors, FlightStatus, fly_interval
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from guidance import PAPER_LANDER, Lander, Plan, PlanStatus, State, solve_pdg
-from guidance.problem import LandingProblem
+from guidance.descent.problem import LandingProblem
 from studies import timing, timing_methods
 from studies.timing import Timing, study_timing
 from studies.timing_conclusions import compare_methods, conclude
@@ -145,7 +145,7 @@ def test_a_plan_that_breaks_a_limit_is_seen() -> None:
 
 
 def test_rebuilt_cvxpy_compiles_every_time() -> None:
-    from guidance import reference_cvxpy
+    from guidance.reference import cvxpy_planner as reference_cvxpy
 
     rebuilt = next(method for method in timed_methods() if method.name == "cvxpy, rebuilt")
     assert rebuilt.prepare is not None

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import guidance
-from guidance.plan import Plan, PlanStatus
+from guidance.descent.plan import Plan, PlanStatus
 
 ODD = st.sampled_from([0.0, -0.0, math.nan, math.inf, -math.inf, 1e300, -1e300, 5e-324, 1e-12, 1e6, -1e6])
 SENSIBLE = st.tuples(

@@ -1,0 +1,170 @@
+"""The conic programme of flights that share a trunk and then part, one branch to each candidate site.
+
+State, mass and thrust of the trunk's nodes are the same variables in every branch. Like `guidance.convex.programme`,
+one solver is built per sparsity from fixed nominal numbers, and every solve replaces all numbers.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from guidance.convex import constraints
+from guidance.convex.clarabel_solver import ConicSolver, SolveStatus
+from guidance.convex.constraint_set import ConstraintSet
+from guidance.convex.constraints import Rows
+from guidance.convex.layout import Layout
+from guidance.convex.programme import ConvexSolution, cones_of, nominal_numbers
+from guidance.convex.scaling import ScaledProblem
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Branching:
+    """What decides the sparsity of the programme.
+
+    Attributes:
+        constraint_set: of each branch.
+        branches: number of candidates.
+        shared_nodes: nodes of the trunk.
+    """
+
+    constraint_set: ConstraintSet
+    branches: int
+    shared_nodes: int
+
+    @property
+    def layout(self) -> Layout:
+        """Of one branch alone, trunk included."""
+        return Layout(self.constraint_set.nodes)
+
+    @cached_property
+    def columns(self) -> NDArray[np.int64]:
+        """Shape (branches, n): where each number of a branch's own layout stands in the decision vector."""
+        size = self.layout.size
+        shared = size // self.constraint_set.nodes * self.shared_nodes
+        own = size - shared
+        out = np.tile(np.arange(size), (self.branches, 1))
+        for branch in range(1, self.branches):
+            out[branch, shared:] = size + (branch - 1) * own + np.arange(own)
+        return out
+
+    @property
+    def size(self) -> int:
+        """Length of the decision vector."""
+        return int(self.columns[-1, -1]) + 1
+
+    def rows(self, scaled: Sequence[ScaledProblem]) -> list[Rows]:
+        """Constraint rows of all branches; those of the trunk alone are stated once.
+
+        Args:
+            scaled: numbers of each branch in equal units, each with its own target as origin.
+        """
+        origin = scaled[0].position
+        parts = []
+        for branch, numbers in enumerate(scaled):
+            aim = origin - numbers.position  # this target as seen from the first
+            shared = replace(numbers, position=origin)
+            for family in self.constraint_set.families:
+                part = family(self.layout, shared)
+                if family is constraints.landing:
+                    part = replace(part, bound=np.concatenate([aim, numbers.target_velocity]))
+                moved = self._moved(part, branch)
+                if moved is not None:
+                    parts.append(moved)
+        return parts
+
+    def _moved(self, part: Rows, branch: int) -> Rows | None:
+        """Rows in the columns of a branch, without the cones that bind the trunk only."""
+        column = self.columns[branch][part.column]
+        if branch == 0:
+            return replace(part, column=column)
+        width = part.cone_size if part.cone == "second_order" else 1
+        kept = np.zeros(part.bound.size // width, dtype=np.bool_)
+        kept[part.row[column >= self.layout.size] // width] = True
+        rows = np.repeat(kept, width)
+        if not rows.any():
+            return None
+        number = np.cumsum(rows) - 1
+        entries = rows[part.row]
+        return Rows(
+            part.name,
+            part.cone,
+            part.cone_size if part.cone == "second_order" else int(rows.sum()),
+            number[part.row[entries]],
+            column[entries],
+            part.value[entries],
+            part.bound[rows],
+        )
+
+
+class BranchedProgramme:
+    """The assembled programme of one Branching."""
+
+    def __init__(self, branching: Branching, tolerance: float = 1e-8) -> None:
+        """Fix sparsity and scaling from nominal numbers that no caller can change."""
+        from scipy.sparse import csc_matrix
+
+        self.branching = branching
+        rows = branching.rows([nominal_numbers(branching.constraint_set.nodes)] * branching.branches)
+        first = np.cumsum([0] + [part.bound.size for part in rows])
+        row = np.concatenate([part.row + offset for part, offset in zip(rows, first, strict=False)])
+        column = np.concatenate([part.column for part in rows])
+        self._order = np.lexsort((row, column))
+        pointer = np.concatenate([[0], np.cumsum(np.bincount(column, minlength=branching.size))])
+        values, bound = self._numbers(rows)
+        shape = (int(first[-1]), branching.size)
+        matrix = csc_matrix((values, row[self._order], pointer), shape=shape)
+        weights = np.full(branching.branches, 1.0 / branching.branches)
+        self._solver = ConicSolver(matrix, bound, self._cost(weights), cones_of(rows), tolerance, True)
+
+    def _numbers(self, rows: list[Rows]) -> tuple[Array, Array]:
+        values = np.concatenate([part.value for part in rows])
+        return values[self._order], np.concatenate([part.bound for part in rows])
+
+    def _cost(self, weights: Array) -> Array:
+        cost = np.zeros(self.branching.size)
+        cost[self.branching.columns[:, self.branching.layout.log_mass[-1]]] = -weights
+        return cost
+
+    def solve(self, scaled: Sequence[ScaledProblem], weights: Array) -> list[ConvexSolution] | None:
+        """Least weighted propellant; each branch as a solution of its own, or None if there is none."""
+        rows = self.branching.rows(scaled)
+        answer = self._solver.solve(*self._numbers(rows), self._cost(weights))
+        if answer.status is not SolveStatus.SOLVED:
+            return None
+        layout = self.branching.layout
+        return [
+            ConvexSolution(
+                replace(answer, primal=answer.primal[columns]),
+                layout,
+                scaled[0],
+                rows,
+                -float(scaled[0].kappa * answer.primal[columns[layout.log_mass[-1]]]),
+                np.nan,
+            )
+            for columns in self.branching.columns
+        ]
+
+
+class _ProgrammeCache(threading.local):
+    """Programmes of one thread: a solver object must not be shared while it solves."""
+
+    def __init__(self) -> None:
+        self.programmes: dict[Branching, BranchedProgramme] = {}
+
+
+_CACHE = _ProgrammeCache()
+
+
+def branched_programme(branching: Branching) -> BranchedProgramme:
+    """The assembled programme of a Branching: built once per thread, then kept."""
+    if branching not in _CACHE.programmes:
+        _CACHE.programmes[branching] = BranchedProgramme(branching)
+    return _CACHE.programmes[branching]

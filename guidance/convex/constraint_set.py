@@ -1,0 +1,90 @@
+"""Which constraint families a landing problem needs: what decides the sparsity of its convex problem."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from guidance.convex import constraints
+from guidance.convex.condensed import burnt_mass, landing_moments
+from guidance.convex.constraints import Rows
+from guidance.convex.scaling import ScaledProblem
+from guidance.descent.problem import LandingProblem
+
+Family = Callable[[Any, ScaledProblem], Rows]  # a Layout or a CondensedLayout
+
+
+@dataclass(frozen=True)
+class ConstraintSet:
+    """What decides the sparsity of the problem.
+
+    Attributes:
+        nodes: N.
+        min_thrust: whether the engine has a lower bound.
+        pointing: whether the thrust direction is limited.
+        glide_slope: whether there is a glide slope limit below the horizon.
+        speed_limit: whether the speed is limited.
+        free_landing_point: whether the landing point may move in the target's plane.
+    """
+
+    nodes: int
+    min_thrust: bool = False
+    pointing: bool = False
+    glide_slope: bool = False
+    speed_limit: bool = False
+    free_landing_point: bool = False
+
+    @classmethod
+    def of(cls, problem: LandingProblem, nodes: int, free_landing_point: bool = False) -> ConstraintSet:
+        """The constraint set that `problem` needs."""
+        pointing = problem.lander.pointing_limit
+        return cls(
+            nodes,
+            problem.lander.min_thrust > 0.0,
+            pointing is not None and pointing < np.pi,
+            problem.has_glide_slope,
+            problem.speed_limit is not None,
+            free_landing_point,
+        )
+
+    @property
+    def families(self) -> list[Family]:
+        """Constraint functions in row order."""
+        chosen: list[tuple[bool, Family]] = [
+            (True, constraints.start),
+            (True, constraints.motion),
+            (True, constraints.landing),
+            (True, constraints.max_thrust),
+            (self.min_thrust, constraints.min_thrust),
+            (True, constraints.altitude_floor),
+            (self.pointing, constraints.pointing),
+            (True, constraints.dry_mass),
+            (self.free_landing_point, constraints.landing_error_limit),
+            (True, constraints.thrust_cone),
+            (self.glide_slope, constraints.glide_slope),
+            (self.speed_limit, constraints.speed_limit),
+            (self.free_landing_point, constraints.landing_error),
+        ]
+        return [family for wanted, family in chosen if wanted]
+
+    @property
+    def can_condense(self) -> bool:
+        """Whether the problem without its states says all but the altitude floor."""
+        return not (self.glide_slope or self.speed_limit or self.free_landing_point)
+
+    @property
+    def condensed_families(self) -> list[Family]:
+        """Constraint functions of the problem without its states, in row order."""
+        chosen: list[tuple[bool, Family]] = [
+            (True, burnt_mass),
+            (True, landing_moments),
+            (True, constraints.max_thrust),
+            (self.min_thrust, constraints.min_thrust),
+            (self.pointing, constraints.pointing),
+            (True, constraints.dry_mass),
+            (True, constraints.thrust_cone),
+        ]
+        return [family for wanted, family in chosen if wanted]

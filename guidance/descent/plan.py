@@ -1,0 +1,174 @@
+"""A planned descent: what every method returns, and what a planner raises that has none to give."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from guidance.descent.certificate import Certificate
+from guidance.descent.problem import LandingProblem
+from guidance.descent.residuals import Residuals, fly_residuals
+from guidance.descent.trajectory import Trajectory, no_trajectory
+
+Array = NDArray[np.float64]
+
+
+class PlanStatus(Enum):
+    """How planning ended."""
+
+    OPTIMAL = "optimal"
+    """Least propellant to the target."""
+    NEAREST = "nearest"
+    """The target is out of reach: least propellant to the reachable point nearest to it."""
+    INFEASIBLE = "infeasible"
+    """No flight exists within the scope that the certificate states."""
+    SOLVER_FAILED = "solver failed"
+    """The solver broke down; nothing is known."""
+    LIMIT_REACHED = "limit reached"
+    """Iterations ran out before feasibility was decided or accuracy reached; nothing is known."""
+
+    @property
+    def has_flight(self) -> bool:
+        """Whether the plan holds a trajectory."""
+        return self in (PlanStatus.OPTIMAL, PlanStatus.NEAREST)
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """A descent, in SI and the site frame.
+
+    Attributes:
+        status: how planning ended.
+        problem: what was asked.
+        method: which solver planned.
+        trajectory: the flight on N nodes (N - 1 intervals); empty where the status has none.
+        landing_error: [m] distance from landing point to target; nan without a flight.
+        message: the ending in words.
+        certificate: why no flight exists, where the status is INFEASIBLE (or NEAREST, if proved).
+        solves: conic (or nonlinear) programmes solved on the way, coarse ones and refinements included;
+            those of proofs are not.
+    """
+
+    status: PlanStatus
+    problem: LandingProblem
+    method: str
+    trajectory: Trajectory = field(default_factory=no_trajectory)
+    landing_error: float = float("nan")
+    message: str = ""
+    certificate: Certificate | None = None
+    solves: int = 0
+
+    @classmethod
+    def of_flight(
+        cls,
+        status: PlanStatus,
+        problem: LandingProblem,
+        method: str,
+        trajectory: Trajectory,
+        solves: int = 0,
+    ) -> Plan:
+        """A plan with a flight."""
+        miss = float(np.linalg.norm(trajectory.position[-1, :2] - problem.target[:2]))
+        return cls(status, problem, method, trajectory, miss, message=status.value, solves=solves)
+
+    @property
+    def time(self) -> Array:
+        """[s] shape (N,), from 0 to `time_of_flight`."""
+        return self.trajectory.time
+
+    @property
+    def position(self) -> Array:
+        """[m] shape (N, 3)."""
+        return self.trajectory.position
+
+    @property
+    def velocity(self) -> Array:
+        """[m/s] shape (N, 3)."""
+        return self.trajectory.velocity
+
+    @property
+    def mass(self) -> Array:
+        """[kg] shape (N,)."""
+        return self.trajectory.mass
+
+    @property
+    def thrust(self) -> Array:
+        """[N] shape (N, 3)."""
+        return self.trajectory.thrust
+
+    @property
+    def nodes(self) -> int:
+        """N; zero without a flight."""
+        return self.trajectory.nodes
+
+    @property
+    def time_of_flight(self) -> float:
+        """[s] duration; nan without a flight."""
+        return self.trajectory.duration
+
+    @property
+    def propellant(self) -> float:
+        """[kg] propellant that the plan burns; nan without a flight."""
+        return float(self.mass[0] - self.mass[-1]) if self.mass.size else float("nan")
+
+    def thrust_at(self, time: ArrayLike) -> Array:
+        """Planned thrust; before the start that of the start, after the end none (engine cut-off).
+
+        Args:
+            time: [s] since the plan's start; a number, or shape (k,).
+
+        Returns:
+            [N] shape (3,), or (k, 3).
+
+        Raises:
+            ValueError: the plan holds no flight.
+        """
+        self._demand_flight("has no thrust")
+        return self.trajectory.thrust_at(time)
+
+    @cached_property
+    def residuals(self) -> Residuals:
+        """What the plan misses when it is flown through the true motion; computed on first use.
+
+        Raises:
+            ValueError: the plan holds no flight.
+        """
+        self._demand_flight("cannot be flown")
+        return fly_residuals(self.trajectory, self.problem)
+
+    @property
+    def keeps_limits(self) -> bool:
+        """Whether there is a flight and, flown, it lands where it says and keeps every limit.
+
+        The tolerance is `guidance.descent.residuals.FLIGHT_TOLERANCE`.
+        """
+        return self.nodes > 0 and self.residuals.keeps_limits(self.problem)
+
+    def _demand_flight(self, lack: str) -> None:
+        if self.nodes == 0:
+            raise ValueError(f"a plan with status '{self.status.value}' {lack}")
+
+
+class GuidanceError(Exception):
+    """A planner has no plan.
+
+    Attributes:
+        plan: the labelled result without a trajectory (its status, message and certificate).
+    """
+
+    def __init__(self, message: str, plan: Plan) -> None:
+        """Keep the labelled result beside the words."""
+        super().__init__(message)
+        self.plan = plan
+
+
+class InfeasibleError(GuidanceError):
+    """No flight within the limits exists; `plan.certificate` proves it, and its `scope` says how far."""
+
+
+class SolverFailedError(GuidanceError):
+    """The solver stopped without an answer: nothing is said about whether a flight exists."""

@@ -1,0 +1,120 @@
+"""Command line of `python -m guidance.pdg`."""
+
+from __future__ import annotations
+
+import math
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from guidance.console import tolerate_encoding
+from guidance.descent.plan import GuidanceError, Plan
+from guidance.descent.residuals import RESIDUAL_UNITS
+from guidance.lander import Lander
+from guidance.pdg.solve import DEFAULT_NODES, solve_pdg
+
+
+@dataclass(frozen=True)
+class PdgCommand:
+    """Plan a powered descent with the least propellant, print it, and draw it.
+
+    Attributes:
+        state: Start: x y z [m], vx vy vz [m/s], mass [kg]; x east, y north, z up.
+        target: Landing point x y z [m].
+        target_velocity: Velocity x y z at the landing point [m/s].
+        dry_mass: Mass with an empty tank [kg].
+        max_thrust: Greatest thrust [N].
+        min_thrust: Least thrust [N].
+        specific_impulse: [s], referred to 9.80665 m/s^2.
+        gravity: Gravity x y z [m/s^2].
+        pointing_limit_deg: Greatest angle of thrust from the vertical [deg].
+        glide_slope_limit_deg: Greatest angle of the vehicle from the vertical, seen from the landing point
+            [deg].
+        speed_limit: Greatest speed [m/s].
+        time_of_flight: [s]; searched for unless given.
+        nodes: Nodes of the plan.
+        method: convex is fast; cvxpy and casadi are independent references.
+        unreachable: Fail, or land at the reachable point nearest to the target.
+        plot: File to draw the plan into, such as plan.png.
+    """
+
+    state: tuple[float, float, float, float, float, float, float]
+    target: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    target_velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    dry_mass: float = 1150.0
+    max_thrust: float = 12000.0
+    min_thrust: float = 0.0
+    specific_impulse: float = 325.0
+    gravity: tuple[float, float, float] = (0.0, 0.0, -1.62)
+    pointing_limit_deg: float | None = None
+    glide_slope_limit_deg: float | None = None
+    speed_limit: float | None = None
+    time_of_flight: float | None = None
+    nodes: int = DEFAULT_NODES
+    method: Literal["convex", "cvxpy", "casadi"] = "convex"
+    unreachable: Literal["raise", "nearest"] = "raise"
+    plot: Path | None = None
+
+    def solve(self) -> Plan:
+        """The plan that the command asks for; raises what `solve_pdg` raises."""
+        pointing, glide = self.pointing_limit_deg, self.glide_slope_limit_deg
+        lander = Lander(
+            dry_mass=self.dry_mass,
+            max_thrust=self.max_thrust,
+            specific_impulse=self.specific_impulse,
+            min_thrust=self.min_thrust,
+            pointing_limit=None if pointing is None else math.radians(pointing),
+        )
+        return solve_pdg(
+            self.state,
+            self.target,
+            lander=lander,
+            gravity=self.gravity,
+            glide_slope_limit=None if glide is None else math.radians(glide),
+            speed_limit=self.speed_limit,
+            time_of_flight=self.time_of_flight,
+            nodes=self.nodes,
+            method=self.method,
+            unreachable=self.unreachable,
+            target_velocity=self.target_velocity,
+        )
+
+
+def describe(plan: Plan) -> str:
+    """A plan in a few lines: what it costs, and what it misses when flown through the true motion."""
+    flown = [f"{name} {getattr(plan.residuals, name):.2g} {unit}" for name, unit in RESIDUAL_UNITS.items()]
+    return "\n".join(
+        [
+            f"status          {plan.status.value} ({plan.method})",
+            f"time of flight  {plan.time_of_flight:.3f} s, {plan.nodes} nodes",
+            f"propellant      {plan.propellant:.3f} kg, final mass {plan.mass[-1]:.3f} kg",
+            f"landing error   {plan.landing_error:.2f} m",
+            "flown, it misses what was planned or allowed by",
+            *(f"                {', '.join(flown[k : k + 3])}" for k in range(0, len(flown), 3)),
+        ]
+    )
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run the command; exit status 1 without a flight, 2 for a wrong argument."""
+    import tyro
+
+    tolerate_encoding()
+    command = tyro.cli(PdgCommand, args=arguments, prog="python -m guidance.pdg")
+    try:
+        plan = command.solve()
+        if command.plot is not None:
+            from guidance.descent.picture import save_plan_figure
+
+            save_plan_figure(plan, command.plot)
+    except GuidanceError as error:
+        scope = "" if error.plan.certificate is None else f"\nproof: {error.plan.certificate.scope}"
+        sys.stderr.write(f"no flight: {error}{scope}\n")
+        raise SystemExit(1) from None
+    except (ValueError, OSError) as error:
+        sys.stderr.write(f"error: {error}\n")
+        raise SystemExit(2) from None
+    sys.stdout.write(describe(plan) + "\n")
+    if command.plot is not None:
+        sys.stdout.write(f"picture         {command.plot}\n")

@@ -1,0 +1,199 @@
+"""Plans by convex optimisation: to the target, or to the softly reachable point nearest to it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from guidance.convex.programme import ConvexSolution
+from guidance.descent.certificate import Certificate
+from guidance.descent.plan import Plan, PlanStatus
+from guidance.descent.problem import LandingProblem
+from guidance.flight_time.time_window import forbidden_by
+from guidance.planning.infeasibility import prove_fixed_time, prove_free_time
+from guidance.planning.minimum_propellant import (
+    SHARE_TOLERANCE,
+    ConvexTask,
+    minimise_over_time,
+    minimise_with_true_bounds,
+    promised_gain,
+    relaxation_tight,
+)
+from guidance.reference.trajectory_guess import swing_sideways
+
+METHOD = "convex"
+_OVERDRAFT = 1e-9  # in ln(mass): rounding of the solver
+_REPLAN_TOLERANCE = 1.5e-5  # in ln(mass), as SHARE_TOLERANCE: 18 g at 1200 kg
+_LOCAL_GAP = 2e-3  # of propellant, over the relaxed flight's: not worth another guess
+_WORTH_A_SEARCH = 0.05
+"""Gain in ln(mass), by the derivative at the refined flight, above which its time is searched anew.
+
+The presets' tables rest on it: lower, a late replan in some 200 episodes burns up to 5 % less.
+"""
+_ERROR_TOLERANCE = 0.02  # [m] gain in landing error below which the time search stops
+_ERROR_SLACK = 0.05  # [m] landing error granted to the least-propellant step
+
+
+def plan_convex(
+    problem: LandingProblem,
+    nodes: int,
+    time_of_flight: float | None = None,
+    guess_time: float | None = None,
+) -> Plan:
+    """Least propellant to the target.
+
+    Args:
+        problem: what to solve.
+        nodes: N.
+        time_of_flight: [s] or None to search for the best.
+        guess_time: [s] start of that search where the indirect method has none; None to find one on a
+            coarse mesh.
+
+    Returns:
+        A plan that is OPTIMAL, or one without a flight: INFEASIBLE means "not found, proof still to come".
+    """
+    task = ConvexTask(problem, nodes)
+    if time_of_flight is not None:
+        cause = forbidden_by(problem, time_of_flight)
+        if cause:
+            return Plan(PlanStatus.INFEASIBLE, problem, METHOD, message=cause)
+        solution, solves = task.solve(time_of_flight), 1
+    else:
+        tolerance = SHARE_TOLERANCE if guess_time is None else _REPLAN_TOLERANCE
+        outcome = minimise_over_time(task, tolerance, guess_time, coarse_first=guess_time is None)
+        solution, solves = outcome.solution, outcome.solves
+        if solution is None and outcome.cause:
+            return Plan(PlanStatus.INFEASIBLE, problem, METHOD, message=outcome.cause)
+    return _finish(task, solution, solves, PlanStatus.OPTIMAL, time_of_flight)
+
+
+def _finish(
+    task: ConvexTask,
+    found: ConvexSolution | None,
+    solves: int,
+    status: PlanStatus,
+    time_of_flight: float | None,
+) -> Plan:
+    """Refine a solution until the true thrust bounds hold, check the tank, and make it a Plan."""
+    problem = task.problem
+    message = "no feasible time of flight found"
+    none = Plan(PlanStatus.INFEASIBLE, problem, METHOD, message=message, solves=solves)
+    if found is None:
+        return none
+    if not found.solved:
+        return replace(none, message=f"no flight of {found.time:g} s ({found.answer.words})")
+    if found.propellant_share > problem.log_mass_ratio + _OVERDRAFT:
+        return replace(none, message=_shortage(problem, found))
+    solution, more = task.refine(found)
+    solves += more
+    affordable = _affordable(problem, solution)
+    if time_of_flight is None and (not affordable or promised_gain(task, solution) > _WORTH_A_SEARCH):
+        outcome = minimise_with_true_bounds(
+            task, SHARE_TOLERANCE, found.time, solution if affordable else None
+        )
+        solution, solves = outcome.solution or solution, solves + outcome.solves
+    none = replace(none, solves=solves)
+    if not _affordable(problem, solution):
+        words = "feasible only with thrust bounds relaxed outward: on the edge of what the lander can do"
+        return replace(none, status=PlanStatus.LIMIT_REACHED, message=words)
+    if not relaxation_tight(problem, solution):
+        words = "the relaxed optimum breaks min_thrust or the pointing limit"
+        none = replace(none, status=PlanStatus.LIMIT_REACHED, message=words)
+        return none if status is PlanStatus.NEAREST else _unrelaxed(none, solution, time_of_flight)
+    return Plan.of_flight(status, problem, METHOD, solution.trajectory(problem), solves)
+
+
+def _affordable(problem: LandingProblem, solution: ConvexSolution) -> bool:
+    """Whether there is a flight, and the propellant on board suffices for it."""
+    return solution.solved and solution.propellant_share <= problem.log_mass_ratio + _OVERDRAFT
+
+
+def _unrelaxed(lost: Plan, relaxed: ConvexSolution, time_of_flight: float | None) -> Plan:
+    """Ask the unrelaxed problem where relaxing lost something: a local method, so from several guesses.
+
+    A flight that burns hardly more than the relaxed one ends the search; otherwise the best of all counts.
+    """
+    from guidance.reference.casadi_planner import plan_casadi
+
+    problem, solves = lost.problem, lost.solves
+    flight = relaxed.trajectory(problem)
+    nodes = flight.nodes
+    bound = problem.state.mass * -math.expm1(-relaxed.propellant_share)
+    guesses = [flight, swing_sideways(problem, flight, in_plane=True), None]
+    best, said = lost, []
+    for guess in guesses:
+        start = None if guess is None else Plan.of_flight(PlanStatus.OPTIMAL, problem, METHOD, guess)
+        found = plan_casadi(problem, nodes, time_of_flight, start)
+        solves += found.solves
+        said.append(found.message)
+        if found.status.has_flight and not best.propellant <= found.propellant:
+            best = found
+        if best.propellant <= (1.0 + _LOCAL_GAP) * bound:
+            break
+    message = best.message if best.status.has_flight else said[0]
+    return replace(best, solves=solves, message=f"{message}; {lost.message}")
+
+
+def _shortage(problem: LandingProblem, solution: ConvexSolution) -> str:
+    needed = problem.state.mass * -math.expm1(-solution.propellant_share)
+    return (
+        f"propellant: the cheapest flight found needs {needed:.2f} kg, "
+        f"{problem.state.mass - problem.lander.dry_mass:.2f} kg are on board"
+    )
+
+
+def prove_infeasible(
+    problem: LandingProblem, nodes: int, time_of_flight: float | None, free_landing_point: bool = False
+) -> Certificate | ConvexSolution | None:
+    """Certificate that no flight exists, or a solution that refutes it, or None where neither was found."""
+    task = ConvexTask(problem, nodes, free_landing_point)
+    if time_of_flight is not None:
+        return prove_fixed_time(task, time_of_flight)
+    return prove_free_time(task)
+
+
+def plan_nearest(problem: LandingProblem, nodes: int, time_of_flight: float | None = None) -> Plan:
+    """Land softly as near to the target as possible, in its plane, then with the least propellant.
+
+    Three convex problems: the cheapest soft landing anywhere (which tells whether there is one), the least
+    landing error with the propellant on board, the least propellant to within that error (Blackmore,
+    Acikmese and Scharf, JGCD 33(4), 2010, "prioritized" scheme).
+
+    Returns:
+        A plan that is NEAREST, or one without a flight (no soft landing anywhere was found).
+    """
+    anywhere = ConvexTask(problem, nodes, free_landing_point=True)
+    nearest = replace(anywhere, least_error=True, limit_propellant=True)
+    if time_of_flight is not None:
+        cause = forbidden_by(problem, time_of_flight, free_landing_point=True)
+        if cause:
+            return Plan(PlanStatus.INFEASIBLE, problem, METHOD, message=cause)
+        least = nearest.solve(time_of_flight)
+        solves = 1
+    else:
+        cheapest = minimise_over_time(anywhere)
+        solves = cheapest.solves
+        found = cheapest.solution
+        if found is None or found.propellant_share > problem.log_mass_ratio:
+            message = "no soft landing anywhere in the target's plane was found"
+            if found is not None:
+                message += f"; {_shortage(problem, found)}"
+            return Plan(PlanStatus.INFEASIBLE, problem, METHOD, message=message, solves=solves)
+        outcome = minimise_over_time(nearest, _ERROR_TOLERANCE, found.time)
+        solves += outcome.solves
+        least = outcome.solution or nearest.solve(found.time)
+    if not least.solved:
+        message = f"no soft landing anywhere in the target's plane ({least.answer.words})"
+        return Plan(PlanStatus.INFEASIBLE, problem, METHOD, message=message, solves=solves)
+    refined, more = nearest.refine(least)
+    solves += more
+    error = (refined if refined.solved else least).landing_error
+    economical = replace(anywhere, error_limit=1.001 * error + _ERROR_SLACK)
+    if time_of_flight is not None:
+        last, more = economical.solve(time_of_flight), 1
+    else:
+        outcome = minimise_over_time(economical, SHARE_TOLERANCE, least.time, coarse_first=False)
+        last, more = outcome.solution, outcome.solves
+        if last is not None and last.propellant_share > problem.log_mass_ratio + _OVERDRAFT:
+            last, more = economical.solve(least.time), more + 1
+    return _finish(economical, last, solves + more, PlanStatus.NEAREST, time_of_flight)

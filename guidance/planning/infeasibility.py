@@ -1,0 +1,95 @@
+"""Proofs that a landing is impossible: for one time of flight, and for all that closed-form bounds admit."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from guidance.convex.constraint_set import ConstraintSet
+from guidance.convex.programme import ConvexSolution, convex_template
+from guidance.convex.scaling import scale_problem
+from guidance.descent.certificate import Certificate, FarkasProof
+from guidance.flight_time.time_window import TimeWindow, forbidden_by, time_window
+from guidance.planning.minimum_propellant import ConvexTask
+
+
+def prove_at(task: ConvexTask, time: float) -> FarkasProof | ConvexSolution:
+    """Proof that no flight lasts `time`, or the solution that kept it from being found.
+
+    The thrust bounds are relaxed outward. Where the relaxed problem is infeasible the solver's dual vector is
+    the proof, whatever the solver calls it: it may stop for numerical reasons on a good one, and what counts
+    is that our own check verifies it. Where the problem is feasible, but its cheapest flight overdraws the
+    tank, the dual solution y of "propellant >= y-bound" becomes a proof by giving the tank's row the
+    multiplier one.
+    """
+    cheapest = replace(task, least_error=False, limit_propellant=False, condense=False)
+    solution = cheapest.solve(time)
+    if not np.isfinite(solution.answer.dual).all():
+        return solution
+    problem, nodes = task.problem, task.nodes
+    scaled = scale_problem(problem, time, nodes, None, task.error_limit, limit_propellant=True)
+    rows = convex_template(ConstraintSet.of(problem, nodes, task.free_landing_point)).rows(scaled)
+    multipliers = solution.answer.dual.copy()
+    if solution.solved:
+        first = 0
+        for part in rows:
+            if part.name == "propellant":
+                multipliers[first] += 1.0
+            first += part.bound.size
+    proof = FarkasProof(time, rows, multipliers, scaled.reach)
+    return proof if proof.verified else solution
+
+
+def _closed_form(window: TimeWindow) -> Certificate:
+    scope = f"every time of flight, on any mesh: closed-form bound on {window.cause}"
+    return Certificate(scope, (window.cause,))
+
+
+def prove_fixed_time(task: ConvexTask, time: float) -> Certificate | None:
+    """Certificate for one time of flight; None if there is no verified proof."""
+    window = time_window(task.problem, task.free_landing_point)
+    if window.empty:
+        return _closed_form(window)
+    cause = forbidden_by(task.problem, time, task.free_landing_point)
+    if cause:
+        return Certificate(f"time of flight {time:g} s, on any mesh: closed-form bound on {cause}", (cause,))
+    proof = prove_at(task, time)
+    if not isinstance(proof, FarkasProof):
+        return None
+    scope = (
+        f"time of flight {time:g} s, {task.nodes} nodes, thrust bounds relaxed outward: verified Farkas proof"
+    )
+    return Certificate(scope, proof.causes, (proof,))
+
+
+def prove_free_time(task: ConvexTask, also: tuple[float, ...] = ()) -> Certificate | ConvexSolution | None:
+    """Certificate for a free time of flight: closed-form bounds outside a window, Farkas proofs inside.
+
+    Args:
+        task: what was to be solved.
+        also: [s] further times to prove, such as the best one found.
+
+    Returns:
+        The certificate; or a solution, where a time on the grid turns out to be feasible; or None, where a
+        proof could not be verified.
+    """
+    window = time_window(task.problem, task.free_landing_point)
+    if window.empty:
+        return _closed_form(window)
+    proofs = []
+    times = np.union1d(window.grid(), np.array(also))
+    for time in times:
+        proof = prove_at(task, float(time))
+        if isinstance(proof, FarkasProof):
+            proofs.append(proof)
+            continue
+        if proof.solved and proof.propellant_share <= task.problem.log_mass_ratio:
+            return proof
+        return None
+    causes = tuple(dict.fromkeys(cause for proof in proofs for cause in proof.causes))
+    scope = (
+        f"{len(proofs)} times of flight from {window.low:.3g} to {window.high:.3g} s, {task.nodes} nodes, "
+        "thrust bounds relaxed outward: verified Farkas proofs; all times outside: closed-form bounds"
+    )
+    return Certificate(scope, causes, tuple(proofs))

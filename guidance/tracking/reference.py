@@ -1,0 +1,144 @@
+"""Flying a plan with thrust held over control periods: a sampled reference, and feedback about it.
+
+The reference is sampled at the control instants. Over each period the feedforward is the mean thrust
+acceleration that takes the reference's velocity from one instant to the next, so that a held thrust keeps its
+pace. The feedback is a discrete linear-quadratic regulator of the double integrator that remains, the same on
+each axis:
+
+    u_k = a_k - K_r (r - r_k) - K_v (v - v_k),    thrust = m u_k / (1 + e),
+
+with e the engine's present error ratio, estimated from the last period's change of velocity.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from guidance.descent.plan import Plan
+from guidance.validation import finite_number
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class TrackingReference:
+    """A descent at the control instants. n nodes have n - 1 control periods.
+
+    Attributes:
+        control_period: [s] time between nodes.
+        position: [m] shape (n, 3).
+        velocity: [m/s] shape (n, 3).
+        thrust_acceleration: [m/s^2] shape (n - 1, 3), mean over each period.
+    """
+
+    control_period: float
+    position: Array
+    velocity: Array
+    thrust_acceleration: Array
+
+    def __post_init__(self) -> None:
+        """Check that the parts belong together, and freeze them."""
+        nodes = self.position.shape[0]
+        shapes = {"position": (nodes, 3), "velocity": (nodes, 3), "thrust_acceleration": (nodes - 1, 3)}
+        for name, shape in shapes.items():
+            part = getattr(self, name)
+            if part.shape != shape or nodes < 2:
+                raise ValueError(f"{name} must have shape {shape} with at least 2 nodes, got {part.shape}")
+            part.flags.writeable = False
+
+    @property
+    def duration(self) -> float:
+        """[s] from the first node to the last."""
+        return self.control_period * self.thrust_acceleration.shape[0]
+
+    def after(self, periods: int) -> TrackingReference | None:
+        """What is left after a number of control periods; None where nothing is."""
+        if periods >= self.thrust_acceleration.shape[0]:
+            return None
+        return TrackingReference(
+            self.control_period,
+            self.position[periods:].copy(),
+            self.velocity[periods:].copy(),
+            self.thrust_acceleration[periods:].copy(),
+        )
+
+
+@dataclass(frozen=True)
+class TrackingWeights:
+    """Errors that the regulator counts as equally bad (Bryson's rule).
+
+    Attributes:
+        position: [m].
+        velocity: [m/s].
+        acceleration: [m/s^2] of correction.
+    """
+
+    position: float = 0.2
+    velocity: float = 0.2
+    acceleration: float = 1.0
+
+    def __post_init__(self) -> None:
+        """Refuse weights that mean nothing."""
+        for name in ("position", "velocity", "acceleration"):
+            finite_number(name, getattr(self, name), above=0.0)
+
+
+DEFAULT_WEIGHTS = TrackingWeights()
+
+
+@lru_cache(maxsize=32)
+def tracking_gains(control_period: float, weights: TrackingWeights) -> tuple[float, float]:
+    """Gains (K_r [1/s^2], K_v [1/s]) of the discrete regulator of a double integrator with held input.
+
+    Args:
+        control_period: [s] above zero.
+        weights: the regulator's weights.
+    """
+    import control
+
+    h = finite_number("control_period", control_period, above=0.0)
+    motion = np.array([[1.0, h], [0.0, 1.0]])
+    push = np.array([[0.5 * h * h], [h]])
+    cost = np.diag([weights.position**-2, weights.velocity**-2])
+    gain = np.asarray(control.dlqr(motion, push, cost, [[weights.acceleration**-2]])[0])
+    return float(gain[0, 0]), float(gain[0, 1])
+
+
+def states_at(plan: Plan, times: Array) -> tuple[Array, Array]:
+    """Position and velocity of a plan at given times, exact for its first-order hold.
+
+    Args:
+        plan: with a flight.
+        times: [s] shape (k,), from 0 to the plan's end.
+
+    Returns:
+        Position [m] and velocity [m/s], shape (k, 3) each.
+    """
+    step = plan.time[1]
+    k = np.clip((times / step).astype(np.int64), 0, plan.nodes - 2)
+    s = (times - k * step)[:, None]
+    thrust = plan.thrust / plan.mass[:, None]
+    now = thrust[k] + plan.problem.gravity
+    rise = (thrust[k + 1] - thrust[k]) / step
+    position = plan.position[k] + plan.velocity[k] * s + now * s**2 / 2.0 + rise * s**3 / 6.0
+    velocity = plan.velocity[k] + now * s + rise * s**2 / 2.0
+    return position, velocity
+
+
+def make_reference(
+    position: Array, velocity: Array, control_period: float, gravity: Array
+) -> TrackingReference:
+    """Reference through states at the control instants, with the mean thrust acceleration of each period.
+
+    Args:
+        position: [m] shape (n, 3).
+        velocity: [m/s] shape (n, 3).
+        control_period: [s] between nodes.
+        gravity: [m/s^2] shape (3,).
+    """
+    feedforward = np.diff(velocity, axis=0) / control_period - gravity
+    return TrackingReference(control_period, position, velocity, feedforward)
