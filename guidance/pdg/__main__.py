@@ -118,3 +118,7 @@ def main(arguments: list[str] | None = None) -> None:
     sys.stdout.write(describe(plan) + "\n")
     if command.plot is not None:
         sys.stdout.write(f"picture         {command.plot}\n")
+
+
+if __name__ == "__main__":
+    main()

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from guidance.convex.programme import ConvexSolution
 from guidance.descent.certificate import Certificate
 from guidance.descent.plan import Plan, PlanStatus
 from guidance.descent.problem import LandingProblem
+from guidance.descent.trajectory import Trajectory
 from guidance.flight_time.time_window import forbidden_by
 from guidance.planning.infeasibility import prove_fixed_time, prove_free_time
 from guidance.planning.minimum_propellant import (
@@ -19,12 +20,10 @@ from guidance.planning.minimum_propellant import (
     promised_gain,
     relaxation_tight,
 )
-from guidance.reference.trajectory_guess import swing_sideways
 
 METHOD = "convex"
 _OVERDRAFT = 1e-9  # in ln(mass): rounding of the solver
 _REPLAN_TOLERANCE = 1.5e-5  # in ln(mass), as SHARE_TOLERANCE: 18 g at 1200 kg
-_LOCAL_GAP = 2e-3  # of propellant, over the relaxed flight's: not worth another guess
 _WORTH_A_SEARCH = 0.05
 """Gain in ln(mass), by the derivative at the refined flight, above which its time is searched anew.
 
@@ -34,12 +33,25 @@ _ERROR_TOLERANCE = 0.02  # [m] gain in landing error below which the time search
 _ERROR_SLACK = 0.05  # [m] landing error granted to the least-propellant step
 
 
+@dataclass(frozen=True, eq=False)
+class ConvexAnswer:
+    """What the convex problem says.
+
+    Attributes:
+        plan: the plan, or one without a flight.
+        lossy_flight: the relaxed flight, where it breaks min_thrust or the pointing limit; else None.
+    """
+
+    plan: Plan
+    lossy_flight: Trajectory | None = None
+
+
 def plan_convex(
     problem: LandingProblem,
     nodes: int,
     time_of_flight: float | None = None,
     guess_time: float | None = None,
-) -> Plan:
+) -> ConvexAnswer:
     """Least propellant to the target.
 
     Args:
@@ -51,19 +63,20 @@ def plan_convex(
 
     Returns:
         A plan that is OPTIMAL, or one without a flight: INFEASIBLE means "not found, proof still to come".
+        Where relaxing lost something, the relaxed flight beside it.
     """
     task = ConvexTask(problem, nodes)
     if time_of_flight is not None:
         cause = forbidden_by(problem, time_of_flight)
         if cause:
-            return Plan(PlanStatus.INFEASIBLE, problem, METHOD, message=cause)
+            return ConvexAnswer(Plan(PlanStatus.INFEASIBLE, problem, METHOD, message=cause))
         solution, solves = task.solve(time_of_flight), 1
     else:
         tolerance = SHARE_TOLERANCE if guess_time is None else _REPLAN_TOLERANCE
         outcome = minimise_over_time(task, tolerance, guess_time, coarse_first=guess_time is None)
         solution, solves = outcome.solution, outcome.solves
         if solution is None and outcome.cause:
-            return Plan(PlanStatus.INFEASIBLE, problem, METHOD, message=outcome.cause)
+            return ConvexAnswer(Plan(PlanStatus.INFEASIBLE, problem, METHOD, message=outcome.cause))
     return _finish(task, solution, solves, PlanStatus.OPTIMAL, time_of_flight)
 
 
@@ -73,17 +86,17 @@ def _finish(
     solves: int,
     status: PlanStatus,
     time_of_flight: float | None,
-) -> Plan:
+) -> ConvexAnswer:
     """Refine a solution until the true thrust bounds hold, check the tank, and make it a Plan."""
     problem = task.problem
     message = "no feasible time of flight found"
     none = Plan(PlanStatus.INFEASIBLE, problem, METHOD, message=message, solves=solves)
     if found is None:
-        return none
+        return ConvexAnswer(none)
     if not found.solved:
-        return replace(none, message=f"no flight of {found.time:g} s ({found.answer.words})")
+        return ConvexAnswer(replace(none, message=f"no flight of {found.time:g} s ({found.answer.words})"))
     if found.propellant_share > problem.log_mass_ratio + _OVERDRAFT:
-        return replace(none, message=_shortage(problem, found))
+        return ConvexAnswer(replace(none, message=_shortage(problem, found)))
     solution, more = task.refine(found)
     solves += more
     affordable = _affordable(problem, solution)
@@ -95,43 +108,17 @@ def _finish(
     none = replace(none, solves=solves)
     if not _affordable(problem, solution):
         words = "feasible only with thrust bounds relaxed outward: on the edge of what the lander can do"
-        return replace(none, status=PlanStatus.LIMIT_REACHED, message=words)
+        return ConvexAnswer(replace(none, status=PlanStatus.LIMIT_REACHED, message=words))
     if not relaxation_tight(problem, solution):
         words = "the relaxed optimum breaks min_thrust or the pointing limit"
         none = replace(none, status=PlanStatus.LIMIT_REACHED, message=words)
-        return none if status is PlanStatus.NEAREST else _unrelaxed(none, solution, time_of_flight)
-    return Plan.of_flight(status, problem, METHOD, solution.trajectory(problem), solves)
+        return ConvexAnswer(none, solution.trajectory(problem))
+    return ConvexAnswer(Plan.of_flight(status, problem, METHOD, solution.trajectory(problem), solves))
 
 
 def _affordable(problem: LandingProblem, solution: ConvexSolution) -> bool:
     """Whether there is a flight, and the propellant on board suffices for it."""
     return solution.solved and solution.propellant_share <= problem.log_mass_ratio + _OVERDRAFT
-
-
-def _unrelaxed(lost: Plan, relaxed: ConvexSolution, time_of_flight: float | None) -> Plan:
-    """Ask the unrelaxed problem where relaxing lost something: a local method, so from several guesses.
-
-    A flight that burns hardly more than the relaxed one ends the search; otherwise the best of all counts.
-    """
-    from guidance.reference.casadi_planner import plan_casadi
-
-    problem, solves = lost.problem, lost.solves
-    flight = relaxed.trajectory(problem)
-    nodes = flight.nodes
-    bound = problem.state.mass * -math.expm1(-relaxed.propellant_share)
-    guesses = [flight, swing_sideways(problem, flight, in_plane=True), None]
-    best, said = lost, []
-    for guess in guesses:
-        start = None if guess is None else Plan.of_flight(PlanStatus.OPTIMAL, problem, METHOD, guess)
-        found = plan_casadi(problem, nodes, time_of_flight, start)
-        solves += found.solves
-        said.append(found.message)
-        if found.status.has_flight and not best.propellant <= found.propellant:
-            best = found
-        if best.propellant <= (1.0 + _LOCAL_GAP) * bound:
-            break
-    message = best.message if best.status.has_flight else said[0]
-    return replace(best, solves=solves, message=f"{message}; {lost.message}")
 
 
 def _shortage(problem: LandingProblem, solution: ConvexSolution) -> str:
@@ -196,4 +183,4 @@ def plan_nearest(problem: LandingProblem, nodes: int, time_of_flight: float | No
         last, more = outcome.solution, outcome.solves
         if last is not None and last.propellant_share > problem.log_mass_ratio + _OVERDRAFT:
             last, more = economical.solve(least.time), more + 1
-    return _finish(economical, last, solves + more, PlanStatus.NEAREST, time_of_flight)
+    return _finish(economical, last, solves + more, PlanStatus.NEAREST, time_of_flight).plan

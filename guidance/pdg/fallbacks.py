@@ -1,0 +1,197 @@
+"""Who is asked next where a planner has no answer: the one place where planners meet.
+
+1. The method that was chosen.
+2. Where relaxing lost min_thrust or the pointing limit, the unrelaxed problem from several guesses.
+3. Where the unrelaxed problem's local method finds nothing, the convex problem for a guess.
+4. Where the flown plan misses its limits, the same on a finer mesh.
+5. Without a flight: the reachable point nearest to the target, if asked for; then a proof that there is no
+   flight; where that search meets a feasible time instead, the convex problem from there.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from guidance.descent.certificate import Certificate
+from guidance.descent.plan import Plan, PlanStatus
+from guidance.descent.problem import LandingProblem
+from guidance.descent.trajectory import Trajectory
+from guidance.state import State
+
+MOST_NODES = 1000
+"""A plan that does not keep its limits on so many nodes is none."""
+
+_CURED_BY_NODES = ("position", "velocity", "altitude", "glide_slope", "speed", "thrust_above", "thrust_dip")
+_LOCAL_GAP = 2e-3  # of propellant, over the relaxed flight's: not worth another guess
+
+
+@dataclass(frozen=True, eq=False)
+class Request:
+    """What `solve_pdg` asks of a planner.
+
+    Attributes:
+        problem: the landing problem.
+        nodes: N.
+        time_of_flight: [s] or None to search for the best.
+        method: 'convex', 'casadi' or 'cvxpy'.
+        guess: an earlier plan of nearly the same flight, or None.
+    """
+
+    problem: LandingProblem
+    nodes: int
+    time_of_flight: float | None
+    method: str
+    guess: Plan | None = None
+
+    def finer(self, nodes: int, found: Plan) -> Request:
+        """The same on more nodes, from the plan found so far."""
+        return replace(self, nodes=nodes, guess=found)
+
+
+def time_left(guess: Plan, state: State) -> float | None:
+    """[s] what is left of an earlier plan at its node nearest to `state`; None if nothing is."""
+    if guess.nodes == 0:
+        return None
+    pace = guess.time_of_flight
+    gap = np.linalg.norm(guess.position - state.position, axis=1) + 0.1 * pace * np.linalg.norm(
+        guess.velocity - state.velocity, axis=1
+    )
+    left = guess.time_of_flight - float(guess.time[int(gap.argmin())])
+    return left if left > 0.0 else None
+
+
+def plan_by_method(request: Request) -> Plan:
+    """Plan by the chosen method; a plan without a flight still lacks its proof."""
+    if request.method == "convex":
+        return _plan_convex(request)
+    if request.method == "cvxpy":
+        from guidance.reference.cvxpy_planner import plan_cvxpy
+
+        return plan_cvxpy(request.problem, request.nodes, request.time_of_flight)
+    return _plan_casadi(request)
+
+
+def _plan_convex(request: Request) -> Plan:
+    """The convex problem; where relaxing lost something, the unrelaxed one from the relaxed flight."""
+    guess = request.guess
+    return _plan_convex_from(request, None if guess is None else time_left(guess, request.problem.state))
+
+
+def _plan_convex_from(request: Request, seed: float | None) -> Plan:
+    """The same, with the time [s] from which the search starts where the indirect method has none."""
+    from guidance.planning.convex_planner import plan_convex
+
+    answer = plan_convex(request.problem, request.nodes, request.time_of_flight, seed)
+    if answer.lossy_flight is None:
+        return answer.plan
+    return _plan_unrelaxed(answer.plan, answer.lossy_flight, request.time_of_flight)
+
+
+def _plan_unrelaxed(lost: Plan, relaxed: Trajectory, time_of_flight: float | None) -> Plan:
+    """Ask the unrelaxed problem where relaxing lost something: a local method, so from several guesses.
+
+    A flight that burns hardly more than the relaxed one ends the search; otherwise the best of all counts.
+    """
+    from guidance.reference.casadi_planner import plan_casadi
+    from guidance.reference.trajectory_guess import swing_sideways
+
+    problem, solves = lost.problem, lost.solves
+    bound = float(relaxed.mass[0] - relaxed.mass[-1])
+    best, said = lost, []
+    for guess in (relaxed, swing_sideways(problem, relaxed, in_plane=True), None):
+        start = None if guess is None else Plan.of_flight(PlanStatus.OPTIMAL, problem, lost.method, guess)
+        found = plan_casadi(problem, relaxed.nodes, time_of_flight, start)
+        solves += found.solves
+        said.append(found.message)
+        if found.status.has_flight and not best.propellant <= found.propellant:
+            best = found
+        if best.propellant <= (1.0 + _LOCAL_GAP) * bound:
+            break
+    message = best.message if best.status.has_flight else said[0]
+    return replace(best, solves=solves, message=f"{message}; {lost.message}")
+
+
+def _plan_casadi(request: Request) -> Plan:
+    """The unrelaxed problem; where its local method finds no flight, from that of the convex problem."""
+    from guidance.reference.casadi_planner import plan_casadi
+
+    problem, time_of_flight = request.problem, request.time_of_flight
+    plan = plan_casadi(problem, request.nodes, time_of_flight, request.guess)
+    plan = within_limits(plan, lambda finer, found: plan_casadi(problem, finer, time_of_flight, found))
+    if plan.status not in (PlanStatus.SOLVER_FAILED, PlanStatus.LIMIT_REACHED):
+        return plan
+    convex = _plan_convex(replace(request, guess=None))
+    if not convex.status.has_flight:
+        return plan
+    if convex.method == plan.method:  # relaxing lost: it has asked already
+        return replace(convex, solves=plan.solves + convex.solves)
+    again = plan_casadi(problem, request.nodes, time_of_flight, convex)
+    return replace(again, solves=plan.solves + convex.solves + again.solves)
+
+
+def within_limits(plan: Plan, plan_again: Callable[[int, Plan], Plan]) -> Plan:
+    """Fly the plan; where it misses its limits plan again on a finer mesh, or say that it misses them.
+
+    What a mesh hides falls with the square of its intervals.
+
+    Args:
+        plan: a plan with a flight.
+        plan_again: (nodes, plan found so far) -> plan.
+    """
+    before, stalls = math.inf, 0
+    while plan.status.has_flight:
+        if plan.keeps_limits:
+            return plan
+        excess = plan.residuals.excess(plan.problem)
+        worst = max(excess, key=lambda name: excess[name])
+        finer = 1 + math.ceil((plan.nodes - 1) * min(max(1.2 * math.sqrt(excess[worst]), 1.5), 4.0))
+        words = f"flown on {plan.nodes} nodes the plan misses {worst} by {getattr(plan.residuals, worst):.3g}"
+        missed = Plan(PlanStatus.LIMIT_REACHED, plan.problem, plan.method, message=words, solves=plan.solves)
+        # a relaxed thrust that turns round does so within one interval of any mesh
+        turns = worst == "thrust_dip" and plan.method != "casadi"
+        stalls = stalls + 1 if excess[worst] > 0.7 * before else 0
+        if finer > MOST_NODES or turns or worst not in _CURED_BY_NODES or stalls == 2:
+            return missed
+        before = excess[worst]
+        again = plan_again(finer, plan)
+        plan = replace(again if again.status.has_flight else missed, solves=plan.solves + again.solves)
+    return plan
+
+
+def answer_without_flight(plan: Plan, request: Request, unreachable: str) -> Plan:
+    """Fly to the nearest reachable point, where asked to, or tell infeasible from failed by a certificate."""
+    from guidance.planning.convex_planner import plan_nearest, prove_infeasible
+
+    problem, nodes, time_of_flight = request.problem, request.nodes, request.time_of_flight
+    anywhere = False
+    if unreachable == "nearest":
+        nearest = plan_nearest(problem, nodes, time_of_flight)
+        nearest = replace(nearest, solves=plan.solves + nearest.solves)
+        if nearest.status.has_flight:
+            return within_limits(nearest, lambda finer, _: plan_nearest(problem, finer, time_of_flight))
+        anywhere = nearest.status is PlanStatus.INFEASIBLE
+        if anywhere:
+            plan = replace(nearest, method=plan.method)
+    proof = prove_infeasible(problem, nodes, time_of_flight, anywhere)
+    if isinstance(proof, Certificate):
+        return _proved(plan, proof)
+    if plan.method == "convex" and proof is not None and time_of_flight is None and not anywhere:
+        retry = _plan_convex_from(request, proof.time)
+        if retry.status.has_flight:
+            retry = replace(retry, solves=plan.solves + retry.solves)
+            return within_limits(retry, lambda finer, found: _plan_convex(request.finer(finer, found)))
+    if plan.status is PlanStatus.INFEASIBLE:
+        message = f"{plan.message}; infeasibility could not be proved"
+        return replace(plan, status=PlanStatus.LIMIT_REACHED, message=message)
+    return plan
+
+
+def _proved(plan: Plan, proof: Certificate) -> Plan:
+    limits = ", ".join(proof.causes)
+    told = plan.message.startswith("propellant") or plan.message == limits
+    message = plan.message if told else f"{plan.message} (limits: {limits})"
+    return replace(plan, status=PlanStatus.INFEASIBLE, certificate=proof, message=message)
