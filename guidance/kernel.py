@@ -31,10 +31,10 @@ def cache_folder() -> Path:
 
 @cache
 def source_hash() -> str:
-    """Hash of every source file that may hold or call a kernel."""
+    """Hash of every source file of the packages that hold kernels."""
     root = Path(__file__).resolve().parent.parent
     digest = hashlib.sha256(numba.__version__.encode())
-    for package in ("guidance", "hda"):
+    for package in ("guidance", "hda", "rl"):
         for path in sorted((root / package).rglob("*.py")):
             digest.update(path.read_bytes())
     return digest.hexdigest()[:16]

@@ -83,7 +83,7 @@ def measure_plans(options: Bench) -> dict[str, np.ndarray]:
         start = perf_counter()
         plan = solve_pdg(state, view.nominal_target, lander=view.lander, gravity=view.gravity)
         planned = perf_counter()
-        fly_residuals(plan)
+        fly_residuals(plan.trajectory, plan.problem)
         checked = perf_counter()
         if episode >= 0:
             times.append((planned - start, checked - planned))

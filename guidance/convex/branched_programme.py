@@ -1,7 +1,8 @@
 """The conic programme of flights that share a trunk and then part, one branch to each candidate site.
 
-State, mass and thrust of the trunk's nodes are the same variables in every branch. Like `guidance.convex.programme`,
-one solver is built per sparsity from fixed nominal numbers, and every solve replaces all numbers.
+State, mass and thrust of the trunk's nodes are the same variables in every branch. As in
+`guidance.convex.programme`, one solver is built per sparsity from fixed nominal numbers, and every solve
+replaces all numbers.
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """States and thrusts on N nodes (N - 1 equal intervals), in SI and the site frame; empty without a flight.
+    """States and thrusts on N nodes (N - 1 equal intervals), in SI and the site frame; or none.
 
     Between nodes the thrust *acceleration* is linear in time (first-order hold). Arrays are read-only.
 

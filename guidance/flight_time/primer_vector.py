@@ -1,4 +1,4 @@
-"""Least-propellant flight by the indirect method: Lawden's primer vector (see `guidance.flight_time.primer_equations`).
+"""Least-propellant flight by the indirect method: Lawden's primer vector (see `primer_equations`).
 
 It gives the time of flight; the convex problem's dual solution then says whether another time is better.
 """

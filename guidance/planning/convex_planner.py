@@ -11,14 +11,13 @@ from guidance.descent.plan import Plan, PlanStatus
 from guidance.descent.problem import LandingProblem
 from guidance.descent.trajectory import Trajectory
 from guidance.flight_time.time_window import forbidden_by
+from guidance.planning.convex_task import ConvexTask, relaxation_tight
 from guidance.planning.infeasibility import prove_fixed_time, prove_free_time
 from guidance.planning.minimum_propellant import (
     SHARE_TOLERANCE,
-    ConvexTask,
     minimise_over_time,
     minimise_with_true_bounds,
     promised_gain,
-    relaxation_tight,
 )
 
 METHOD = "convex"

@@ -25,7 +25,7 @@ from guidance.convex.scaling import scale_problem
 from guidance.descent.plan import Plan, PlanStatus
 from guidance.descent.problem import LandingProblem
 from guidance.flight_time.time_window import forbidden_by
-from guidance.planning.minimum_propellant import ConvexTask, bounds_hold
+from guidance.planning.convex_task import ConvexTask, bounds_hold
 from guidance.validation import finite_number, finite_vector
 
 Array = NDArray[np.float64]

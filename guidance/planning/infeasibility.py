@@ -7,11 +7,12 @@ from dataclasses import replace
 import numpy as np
 
 from guidance.convex.constraint_set import ConstraintSet
+from guidance.convex.farkas import FarkasProof
 from guidance.convex.programme import ConvexSolution, convex_template
 from guidance.convex.scaling import scale_problem
-from guidance.descent.certificate import Certificate, FarkasProof
+from guidance.descent.certificate import Certificate
 from guidance.flight_time.time_window import TimeWindow, forbidden_by, time_window
-from guidance.planning.minimum_propellant import ConvexTask
+from guidance.planning.convex_task import ConvexTask
 
 
 def prove_at(task: ConvexTask, time: float) -> FarkasProof | ConvexSolution:

@@ -1,4 +1,4 @@
-"""One fixed-time task refined until the true thrust bounds hold, and the best time of flight."""
+"""The best time of flight of a convex task."""
 
 from __future__ import annotations
 
@@ -9,128 +9,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from guidance.convex.clarabel_solver import SolveStatus
-from guidance.convex.condensed import keeps_altitude
-from guidance.convex.constraint_set import ConstraintSet
-from guidance.convex.programme import ConvexSolution, convex_template
-from guidance.convex.scaling import scale_problem
-from guidance.descent.problem import LandingProblem
-from guidance.descent.residuals import FLIGHT_TOLERANCE, pointing_excess
+from guidance.convex.programme import ConvexSolution
 from guidance.flight_time.bracket_search import BracketSearch
 from guidance.flight_time.primer_vector import find_primer_flight
 from guidance.flight_time.search import TimeModel, TimeSearch
 from guidance.flight_time.time_window import TimeWindow, guess_time, time_window
+from guidance.planning.convex_task import MOST_REFINEMENTS, ConvexTask, bounds_hold
 
 Array = NDArray[np.float64]
 
-_THRUST_TOLERANCE = 5e-4  # relative; half of what a plan promises
-_DIP = FLIGHT_TOLERANCE.thrust_dip
 _COARSE_NODES = 13
 _NEAR_DEAD_TIME = 0.97  # first steps are small where the guess is good
-_MOST_REFINEMENTS = 8
 _STEPS_FROM_EDGE = (1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3)  # changes of a time that the true bounds refuse
 _COARSE_TOLERANCE = 20.0  # of a bracket's search on the coarse mesh: J has kinks where burns meet its nodes
 SHARE_TOLERANCE = 4e-6
 """Gain in ln(mass) below which the time search stops: 5 g of propellant at 1200 kg."""
-
-
-@dataclass(frozen=True, eq=False)
-class ConvexTask:
-    """What is minimised, under which limits, on how many nodes; only the time of flight is left open.
-
-    Attributes:
-        problem: the landing problem.
-        nodes: N.
-        free_landing_point: whether the landing point may move in the target's plane.
-        least_error: whether to minimise the landing error in place of the propellant.
-        error_limit: [m] greatest landing error; None for none.
-        limit_propellant: whether the dry mass bounds the flight (see `guidance.convex.scaling.scale_problem`).
-        tolerance: of the conic solver.
-        condense: whether to try the problem without its states first; False where the dual solution of the
-            whole problem is wanted.
-    """
-
-    problem: LandingProblem
-    nodes: int
-    free_landing_point: bool = False
-    least_error: bool = False
-    error_limit: float | None = None
-    limit_propellant: bool = False
-    tolerance: float = 1e-8
-    condense: bool = True
-
-    def solve(self, time: float, log_mass: Array | None = None) -> ConvexSolution:
-        """One conic solve; thrust bounds linearised at `log_mass` (any length), or outward if None."""
-        if log_mass is not None and log_mass.size != self.nodes:
-            shares = np.linspace(0.0, 1.0, log_mass.size)
-            log_mass = np.interp(np.linspace(0.0, 1.0, self.nodes), shares, log_mass)
-        chosen = ConstraintSet.of(self.problem, self.nodes, self.free_landing_point)
-        scaled = scale_problem(
-            self.problem, time, self.nodes, log_mass, self.error_limit, self.limit_propellant
-        )
-        if self.condense and chosen.can_condense:
-            solution = convex_template(chosen, self.tolerance, condensed=True).solve(scaled)
-            if solution.solved and keeps_altitude(solution.layout, solution.answer.primal):
-                return solution
-            if solution.answer.status is SolveStatus.INFEASIBLE:
-                return solution
-        return convex_template(chosen, self.tolerance).solve(scaled, self.least_error)
-
-    def refine(self, solution: ConvexSolution, reference: Array | None = None) -> tuple[ConvexSolution, int]:
-        """Linearise anew until the true thrust bounds hold.
-
-        Args:
-            solution: a solved answer of this task.
-            reference: the log-mass it was linearised at; None if it was relaxed outward.
-
-        Returns:
-            The refined solution, unsolved if the bounds cannot be met; how many solves it took.
-        """
-        for solves in range(_MOST_REFINEMENTS):
-            if not solution.solved or bounds_hold(self.problem, solution, reference):
-                return solution, solves
-            reference = solution.log_mass
-            solution = self.solve(solution.time, reference)
-        return solution, _MOST_REFINEMENTS
-
-
-def bounds_hold(problem: LandingProblem, solution: ConvexSolution, reference: Array | None) -> bool:
-    """Whether the true bounds on mass times acceleration hold, and no thrust is given away, to 0.05 %."""
-    log_mass = solution.log_mass
-    thrust = solution.answer.primal[solution.layout.slack] * np.exp(log_mass)  # share of the full thrust
-    ratio = problem.lander.min_thrust / problem.lander.max_thrust
-    if thrust.max() > 1.0 + _THRUST_TOLERANCE or thrust.min() < ratio * (1.0 - _THRUST_TOLERANCE):
-        return False
-    if reference is None:
-        return True
-    if reference.size != log_mass.size:
-        return False
-    return 0.5 * float(np.max((log_mass - reference) ** 2)) < _THRUST_TOLERANCE
-
-
-def relaxation_tight(problem: LandingProblem, solution: ConvexSolution) -> bool:
-    """Whether the thrust itself, not only its slack, keeps min_thrust and the pointing limit to 0.1 %.
-
-    It does wherever the convexification is lossless. It may not where the time of flight is fixed and too
-    long, where the engine's least thrust exceeds the weight, or where the thrust turns round from one node to
-    the next and dips on the way.
-    """
-    push = solution.answer.primal[solution.layout.acceleration]
-    size = np.linalg.norm(push, axis=1)
-    ratio, limit = problem.lander.min_thrust / problem.lander.max_thrust, problem.lander.pointing_limit
-    thrust = size * np.exp(solution.log_mass)
-    if thrust.min() < ratio * (1.0 - 2.0 * _THRUST_TOLERANCE):
-        return False
-    if ratio > 0.0 and (_least_between(push) * np.exp(solution.log_mass[1:])).min() < ratio * (1.0 - _DIP):
-        return False
-    return pointing_excess(push, limit, 1.0) <= FLIGHT_TOLERANCE.pointing
-
-
-def _least_between(push: Array) -> Array:
-    """Least magnitude on the straight way from each row to the next, shape (N - 1,)."""
-    way = np.diff(push, axis=0)
-    length = np.maximum((way**2).sum(axis=1), 1e-300)
-    share = np.clip(-(push[:-1] * way).sum(axis=1) / length, 0.0, 1.0)
-    return np.linalg.norm(push[:-1] + share[:, None] * way, axis=1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -259,7 +152,7 @@ def _with_true_bounds(task: ConvexTask, time: float, reference: Array | None) ->
     if not solution.solved and reference is not None:
         solution, more = task.refine(task.solve(time))
         solves += 1 + more
-    if solution.solved and more == _MOST_REFINEMENTS:
+    if solution.solved and more == MOST_REFINEMENTS:
         solution = replace(solution, answer=replace(solution.answer, status=SolveStatus.LIMIT_REACHED))
     return solution, solves
 

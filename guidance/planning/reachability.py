@@ -16,7 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from guidance.descent.problem import LandingProblem
 from guidance.flight_time.time_window import forbidden_by
-from guidance.planning.minimum_propellant import ConvexTask, minimise_over_time
+from guidance.planning.convex_task import ConvexTask
+from guidance.planning.minimum_propellant import minimise_over_time
 from guidance.validation import finite_number
 
 Array = NDArray[np.float64]

@@ -1,4 +1,4 @@
-"""The convex problem once more, in cvxpy, written for reading: an independent check of `guidance.convex.programme`.
+"""The convex problem once more, in cvxpy, written for reading: a check that shares no code with the first.
 
     minimise    -z_N                                     z = ln(m / m_start)
     subject to  r' = v,  v' = u + g,  z' = -s / c        u, s linear between nodes (first-order hold)

@@ -13,13 +13,11 @@ with e the engine's present error ratio, estimated from the last period's change
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from guidance.descent.plan import Plan
-from guidance.validation import finite_number
 
 Array = NDArray[np.float64]
 
@@ -65,47 +63,6 @@ class TrackingReference:
             self.velocity[periods:].copy(),
             self.thrust_acceleration[periods:].copy(),
         )
-
-
-@dataclass(frozen=True)
-class TrackingWeights:
-    """Errors that the regulator counts as equally bad (Bryson's rule).
-
-    Attributes:
-        position: [m].
-        velocity: [m/s].
-        acceleration: [m/s^2] of correction.
-    """
-
-    position: float = 0.2
-    velocity: float = 0.2
-    acceleration: float = 1.0
-
-    def __post_init__(self) -> None:
-        """Refuse weights that mean nothing."""
-        for name in ("position", "velocity", "acceleration"):
-            finite_number(name, getattr(self, name), above=0.0)
-
-
-DEFAULT_WEIGHTS = TrackingWeights()
-
-
-@lru_cache(maxsize=32)
-def tracking_gains(control_period: float, weights: TrackingWeights) -> tuple[float, float]:
-    """Gains (K_r [1/s^2], K_v [1/s]) of the discrete regulator of a double integrator with held input.
-
-    Args:
-        control_period: [s] above zero.
-        weights: the regulator's weights.
-    """
-    import control
-
-    h = finite_number("control_period", control_period, above=0.0)
-    motion = np.array([[1.0, h], [0.0, 1.0]])
-    push = np.array([[0.5 * h * h], [h]])
-    cost = np.diag([weights.position**-2, weights.velocity**-2])
-    gain = np.asarray(control.dlqr(motion, push, cost, [[weights.acceleration**-2]])[0])
-    return float(gain[0, 0]), float(gain[0, 1])
 
 
 def states_at(plan: Plan, times: Array) -> tuple[Array, Array]:

@@ -7,7 +7,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from guidance.tracking.reference import TrackingReference, tracking_gains
+from guidance.tracking.reference import TrackingReference
+from guidance.tracking.regulator import tracking_gains
 from guidance.tracking.retarget import shift_landing_point, velocity_change, within_pointing, within_thrust
 from hda.observation import Observation, ScenarioView
 from hda.policies.planned_descent import DescentMemory, PlannedDescent

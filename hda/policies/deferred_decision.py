@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from guidance.descent.plan import PlanStatus
 from guidance.planning.deferred_decision import DeferredDecision, plan_deferred
-from guidance.tracking.reference import TrackingReference, tracking_gains
+from guidance.tracking.reference import TrackingReference
+from guidance.tracking.regulator import tracking_gains
 from guidance.tracking.soft_landing import SoftLanding, plan_soft_landing, sample_descent
 from guidance.validation import finite_number
 from hda.belief import SafetyBelief

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from guidance.descent.plan import PlanStatus
 from guidance.lander import Lander
 from guidance.state import State
-from guidance.tracking.reference import DEFAULT_WEIGHTS, TrackingReference, TrackingWeights, tracking_gains
+from guidance.tracking.reference import TrackingReference
+from guidance.tracking.regulator import DEFAULT_WEIGHTS, TrackingWeights, tracking_gains
 from guidance.tracking.soft_landing import DEFAULT_OPTIONS, SoftLanding, SoftLandingOptions, plan_soft_landing
 from hda.observation import Observation, ScenarioView
 from hda.policies.zem_zev import FixedGainZemZev

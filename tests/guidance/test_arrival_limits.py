@@ -10,12 +10,12 @@ from hypothesis import strategies as st
 
 import guidance
 from guidance import PAPER_LANDER, Lander, PlanStatus, State, propagate
-from guidance.descent.certificate import FarkasProof
+from guidance.convex.farkas import FarkasProof
 from guidance.descent.problem import LandingProblem
 from guidance.flight_time.time_window import forbidden_by, guess_time, time_window
 from guidance.pdg.solve import METHODS
+from guidance.planning.convex_task import ConvexTask
 from guidance.planning.infeasibility import prove_at
-from guidance.planning.minimum_propellant import ConvexTask
 
 START = [180.0, 120.0, 940.0, -7.0, -4.0, -28.0, 1200.0]
 

@@ -8,10 +8,11 @@ from descents import FEASIBLE, GRAVITY, TARGET, arguments, problem_of
 
 import guidance
 from guidance import PAPER_LANDER, InfeasibleError, PlanStatus, State
-from guidance.descent.certificate import Certificate, FarkasProof
+from guidance.convex.farkas import FarkasProof
+from guidance.descent.certificate import Certificate
 from guidance.descent.problem import LandingProblem
+from guidance.planning.convex_task import ConvexTask
 from guidance.planning.infeasibility import prove_at, prove_fixed_time, prove_free_time
-from guidance.planning.minimum_propellant import ConvexTask
 
 START = [180.0, 120.0, 940.0, -7.0, -4.0, -28.0, 1200.0]
 

@@ -18,7 +18,7 @@ from guidance.convex.programme import convex_template
 from guidance.convex.scaling import scale_problem
 from guidance.descent.problem import LandingProblem
 from guidance.flight_time.time_window import guess_time, time_window
-from guidance.planning.minimum_propellant import ConvexTask
+from guidance.planning.convex_task import ConvexTask
 
 NODES = 31
 
@@ -54,8 +54,8 @@ def check_same(problem: LandingProblem, time: float):
         assert condensed.slope == pytest.approx(whole.slope, rel=1e-3, abs=1e-6)
         a, b = condensed.trajectory(problem), whole.trajectory(problem)
         scale = condensed.scaled.length
-        np.testing.assert_allclose(a["position"][-1], b["position"][-1], atol=1e-7 * scale)
-        np.testing.assert_allclose(a["mass"], b["mass"], rtol=1e-4)
+        np.testing.assert_allclose(a.position[-1], b.position[-1], atol=1e-7 * scale)
+        np.testing.assert_allclose(a.mass, b.mass, rtol=1e-4)
 
 
 @pytest.mark.parametrize("case", FEASIBLE, ids=lambda case: case["name"])

@@ -14,7 +14,7 @@ from guidance.convex.constraint_set import ConstraintSet
 from guidance.convex.programme import ConvexTemplate
 from guidance.convex.scaling import scale_problem
 from guidance.descent.problem import LandingProblem
-from guidance.planning.minimum_propellant import ConvexTask
+from guidance.planning.convex_task import ConvexTask
 
 NODES = 31
 NAMES = [case["name"] for case in FEASIBLE]
@@ -79,7 +79,7 @@ def test_units_do_not_matter(case):
     assert here.solved
     assert there.value == pytest.approx(here.value, rel=1e-6)
     np.testing.assert_allclose(
-        there.trajectory(other)["position"], here.trajectory(problem)["position"] * length, atol=2e-3
+        there.trajectory(other).position, here.trajectory(problem).position * length, atol=2e-3
     )
 
 
@@ -135,13 +135,13 @@ def test_each_limit_costs_propellant_and_is_kept(name, change):
     assert dear.solved
     assert dear.value > cheap.value * (1.0 + 1e-4)
     flight = dear.trajectory(limited)
-    size = np.linalg.norm(flight["thrust"], axis=1)
-    offset = flight["position"][:-1] - TARGET
+    size = np.linalg.norm(flight.thrust, axis=1)
+    offset = flight.position[:-1] - TARGET
     burning = size > 100.0
     reached = {
-        "speed limit": np.linalg.norm(flight["velocity"], axis=1).max() / 45.0,
+        "speed limit": np.linalg.norm(flight.velocity, axis=1).max() / 45.0,
         "glide slope": np.arctan2(np.linalg.norm(offset[:, :2], axis=1), offset[:, 2]).max() / 0.25,
-        "pointing": np.arccos(np.clip(flight["thrust"][burning, 2] / size[burning], -1, 1)).max() / 0.6,
+        "pointing": np.arccos(np.clip(flight.thrust[burning, 2] / size[burning], -1, 1)).max() / 0.6,
         "minimum thrust": 1500.0 / size.min(),
         "maximum thrust": size.max() / 7000.0,
     }[name]
@@ -161,7 +161,7 @@ def test_without_the_floor_a_hopeless_descent_is_solved_through_the_ground(monke
     monkeypatch.setattr(ConstraintSet, "families", families)
     through = ConvexTemplate(ConstraintSet(NODES)).solve(scaled)
     assert through.solved
-    assert through.trajectory(problem)["position"][:, 2].min() < 0.0
+    assert through.trajectory(problem).position[:, 2].min() < 0.0
 
 
 def test_relaxation_is_tight_on_the_reference_cases():

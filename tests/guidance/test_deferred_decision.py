@@ -7,8 +7,8 @@ import pytest
 
 from guidance import Lander, State
 from guidance.descent.problem import LandingProblem
+from guidance.planning.convex_task import ConvexTask
 from guidance.planning.deferred_decision import plan_deferred
-from guidance.planning.minimum_propellant import ConvexTask
 
 TIME = 24.5
 NODES = 21
@@ -33,8 +33,8 @@ def test_one_candidate_is_the_fixed_time_convex_solve():
     answer = plan_deferred(PROBLEM, SITES[0], 0.5, TIME, NODES)
     (plan,) = answer.plans
     assert answer.shared_nodes == NODES
-    np.testing.assert_allclose(plan.position, expected["position"], atol=2e-3)
-    np.testing.assert_allclose(plan.velocity, expected["velocity"], atol=1e-3)
+    np.testing.assert_allclose(plan.position, expected.position, atol=2e-3)
+    np.testing.assert_allclose(plan.velocity, expected.velocity, atol=1e-3)
     assert plan.propellant == pytest.approx(1200.0 * -np.expm1(-again.propellant_share), abs=1e-4)
 
 

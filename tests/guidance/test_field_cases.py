@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 from guidance import Lander, PlanStatus, State, solve_pdg
 from guidance.descent.certificate import Certificate
 from guidance.descent.plan import Plan
-from guidance.descent.residuals import RESIDUAL_UNITS, fly_plan
+from guidance.descent.residuals import RESIDUAL_UNITS, fly_trajectory
 from guidance.dynamics import integrate, propagate
 from guidance.pdg.__main__ import main
 
@@ -114,7 +114,7 @@ def test_a_long_flight_does_not_pass_under_the_ground(nodes):
 
 
 def test_a_plan_that_no_mesh_mends_is_none(monkeypatch):
-    monkeypatch.setattr("guidance.pdg.solve.MOST_NODES", 100)
+    monkeypatch.setattr("guidance.pdg.fallbacks.MOST_NODES", 100)
     plan = solve_pdg(
         [-420000, 0, 15000, 1673, 0, 0, 15200],
         ORIGIN,
@@ -203,6 +203,6 @@ def test_the_compiled_flight_of_a_plan_is_the_integrators(kind):
             scale = np.repeat(
                 [*np.maximum(np.abs(plan.position).max(axis=0), 1.0), problem.state.mass], [1, 1, 4, 1]
             )
-            assert (np.abs(fly_plan(plan)[::4] - exact) / scale).max() < 1e-6
+            assert (np.abs(fly_trajectory(plan.trajectory, problem)[::4] - exact) / scale).max() < 1e-6
             checked += 1
     assert checked

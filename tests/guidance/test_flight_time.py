@@ -13,7 +13,8 @@ from guidance import PAPER_LANDER, State
 from guidance.descent.problem import LandingProblem
 from guidance.flight_time.search import TimeModel, TimeSearch
 from guidance.flight_time.time_window import TimeWindow, guess_time, time_window
-from guidance.planning.minimum_propellant import ConvexTask, minimise_over_time
+from guidance.planning.convex_task import ConvexTask
+from guidance.planning.minimum_propellant import minimise_over_time
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,8 @@ from descents import (
 import guidance
 from guidance import InfeasibleError, Lander, PlanStatus, SolverFailedError, State
 from guidance.convex.clarabel_solver import ConicSolver
-from guidance.pdg.solve import METHODS, time_left
+from guidance.pdg.fallbacks import time_left
+from guidance.pdg.solve import METHODS
 
 NAMES = [case["name"] for case in FEASIBLE]
 START = [180.0, 120.0, 940.0, -7.0, -4.0, -28.0, 1200.0]

@@ -73,20 +73,24 @@ def test_without_a_flight(nothing):
         draw_plan(nothing)
 
 
+def doctored(plan, **arrays):
+    return replace(plan, trajectory=replace(plan.trajectory, **arrays))
+
+
 def test_residuals_notice_what_was_doctored(plan):
     assert plan.residuals.position < 0.01
     assert plan.residuals.velocity < 0.01
     assert plan.residuals.thrust_above < 12.0
     assert plan.residuals.altitude < 0.01
-    weak = replace(plan, thrust=0.99 * plan.thrust)
+    weak = doctored(plan, thrust=0.99 * plan.thrust)
     assert weak.residuals.position > 0.5
     assert weak.residuals.landing_velocity > 0.1
-    strong = replace(plan, thrust=1.01 * plan.thrust)
+    strong = doctored(plan, thrust=1.01 * plan.thrust)
     assert strong.residuals.thrust_above == pytest.approx(120.0, abs=15.0)
     assert strong.residuals.velocity > 0.1
-    shifted = replace(plan, position=plan.position + np.array([0.0, 3.0, 0.0]))
+    shifted = doctored(plan, position=plan.position + np.array([0.0, 3.0, 0.0]))
     assert shifted.residuals.position == pytest.approx(3.0, abs=0.01)
-    heavy = replace(plan, mass=plan.mass + 2.0)
+    heavy = doctored(plan, mass=plan.mass + 2.0)
     assert heavy.residuals.mass == pytest.approx(2.0, abs=0.2)
 
 

@@ -17,7 +17,8 @@ from guidance.dynamics import integrate
 from guidance.flight_time.primer_vector import PrimerFlight, find_primer_flight
 from guidance.flight_time.search import TimeModel, TimeSearch
 from guidance.flight_time.time_window import guess_time, time_window
-from guidance.planning.minimum_propellant import ConvexTask, minimise_over_time
+from guidance.planning.convex_task import ConvexTask
+from guidance.planning.minimum_propellant import minimise_over_time
 
 START = [180.0, 120.0, 940.0, -7.0, -4.0, -28.0, 1200.0]
 NODES = 61

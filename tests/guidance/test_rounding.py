@@ -61,7 +61,7 @@ def test_a_flight_may_sink_below_neither_the_target_nor_such_a_start():
     plan = guidance.solve_pdg([30, 0, 50 - 1e-5, 0, 0, 0, 1200], TARGET)
     level = replace(plan, problem=replace(plan.problem, target=TARGET + np.array([0.0, 0.0, 1e-6])))
     assert level.residuals.altitude < 1e-5  # of the start; the target is a little higher
-    lower = replace(plan, thrust=0.9 * plan.thrust)
+    lower = replace(plan, trajectory=replace(plan.trajectory, thrust=0.9 * plan.thrust))
     assert lower.residuals.altitude > 0.01
 
 

@@ -14,8 +14,8 @@ from guidance.descent.problem import LandingProblem
 from guidance.flight_time.primer_vector import find_primer_flight
 from guidance.flight_time.time_window import guess_time, time_window
 from guidance.pdg.solve import METHODS
+from guidance.planning.convex_task import ConvexTask
 from guidance.planning.deferred_decision import plan_deferred
-from guidance.planning.minimum_propellant import ConvexTask
 from guidance.planning.reachability import reachable_set
 from guidance.tracking.reference import make_reference, states_at
 from guidance.tracking.retarget import shift_landing_point
@@ -116,8 +116,8 @@ def test_in_a_frame_that_moves_with_the_velocity_it_is_a_landing_at_rest(seed, s
     if here.solved:
         assert here.value == pytest.approx(there.value, rel=1e-6)
         a, b = here.trajectory(problem), there.trajectory(moving)
-        np.testing.assert_allclose(a["velocity"], b["velocity"] + drift, atol=0.2)
-        np.testing.assert_allclose(a["mass"], b["mass"], atol=0.05)
+        np.testing.assert_allclose(a.velocity, b.velocity + drift, atol=0.2)
+        np.testing.assert_allclose(a.mass, b.mass, atol=0.05)
 
 
 @pytest.mark.parametrize(

@@ -6,13 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from guidance.pdg.solve import solve_pdg
-from guidance.tracking.reference import (
-    TrackingReference,
-    TrackingWeights,
-    make_reference,
-    states_at,
-    tracking_gains,
-)
+from guidance.tracking.reference import TrackingReference, make_reference, states_at
+from guidance.tracking.regulator import TrackingWeights, tracking_gains
 
 GRAVITY = np.array([0.0, 0.0, -1.62])
 

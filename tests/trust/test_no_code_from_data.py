@@ -38,7 +38,7 @@ NEEDS_ALLOW_PICKLE_FALSE = {"numpy.load", "numpy.save"}
 AGENT_LIBRARIES = ("stable_baselines3.", "sb3_contrib.")  # their load() unpickles
 
 ALLOWED: dict[tuple[str, str], str] = {
-    ("guidance/convex/clarabel_solver.py", "importlib.import_module"): "a dependency, by a fixed name, on first use",
+    ("guidance/convex/clarabel_solver.py", "importlib.import_module"): "a dependency, by a fixed name",
     ("guidance/exports.py", "importlib.import_module"): "modules of these packages, by fixed names",
     ("hda/registry.py", "importlib.import_module"): "the policy that the user names: package.module:Name",
     ("hda/registry.py", ".load() of an entry point"): "policies of installed packages",
