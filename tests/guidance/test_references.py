@@ -40,7 +40,7 @@ def test_convex_solver_uses_neither_reference_nor_their_libraries():
 
 @pytest.mark.parametrize("name", ["cvxpy", "casadi"])
 def test_references_use_nothing_of_the_convex_solver(name):
-    loaded = modules_after(f"import guidance.reference_{name} as r; r.plan_{name}")
+    loaded = modules_after(f"import guidance.reference.{name}_planner as r; r.plan_{name}")
     mine = {
         "guidance.convex.programme",
         "guidance.convex.constraints",
