@@ -39,6 +39,8 @@ class Request:
         time_of_flight: [s] or None to search for the best.
         method: 'convex', 'casadi' or 'cvxpy'.
         guess: an earlier plan of nearly the same flight, or None.
+        provisional: whether the plan will be replaced before it is flown to its end, as in closed loop: it is
+            taken as it is found, on its mesh and near the best time.
     """
 
     problem: LandingProblem
@@ -46,6 +48,7 @@ class Request:
     time_of_flight: float | None
     method: str
     guess: Plan | None = None
+    provisional: bool = False
 
     def finer(self, nodes: int, found: Plan) -> Request:
         """The same on more nodes, from the plan found so far."""
@@ -62,6 +65,30 @@ def time_left(guess: Plan, state: State) -> float | None:
     )
     left = guess.time_of_flight - float(guess.time[int(gap.argmin())])
     return left if left > 0.0 else None
+
+
+def answer(request: Request, unreachable: str) -> Plan:
+    """Plan, fly the plan, and say what became of it; without an exception.
+
+    Args:
+        request: what is asked.
+        unreachable: 'raise', or 'nearest' to fly to the reachable point nearest to the target.
+    """
+    plan = plan_by_method(request)
+    if plan.status is not PlanStatus.OPTIMAL:
+        plan = answer_without_flight(plan, request, unreachable)
+    if request.provisional:
+        return plan
+    return within_limits(plan, lambda finer, found: _plan_again(request, finer, found))
+
+
+def _plan_again(request: Request, nodes: int, found: Plan) -> Plan:
+    """The plan that was found once more, on more nodes."""
+    from guidance.planning.convex_planner import plan_nearest
+
+    if found.status is PlanStatus.NEAREST:
+        return plan_nearest(request.problem, nodes, request.time_of_flight)
+    return plan_by_method(request.finer(nodes, found))
 
 
 def plan_by_method(request: Request) -> Plan:
@@ -85,7 +112,7 @@ def _plan_convex_from(request: Request, seed: float | None) -> Plan:
     """The same, with the time [s] from which the search starts where the indirect method has none."""
     from guidance.planning.convex_planner import plan_convex
 
-    answer = plan_convex(request.problem, request.nodes, request.time_of_flight, seed)
+    answer = plan_convex(request.problem, request.nodes, request.time_of_flight, seed, request.provisional)
     if answer.lossy_flight is None:
         return answer.plan
     return _plan_unrelaxed(answer.plan, answer.lossy_flight, request.time_of_flight)
@@ -121,7 +148,8 @@ def _plan_casadi(request: Request) -> Plan:
 
     problem, time_of_flight = request.problem, request.time_of_flight
     plan = plan_casadi(problem, request.nodes, time_of_flight, request.guess)
-    plan = within_limits(plan, lambda finer, found: plan_casadi(problem, finer, time_of_flight, found))
+    if not request.provisional:
+        plan = within_limits(plan, lambda finer, found: plan_casadi(problem, finer, time_of_flight, found))
     if plan.status not in (PlanStatus.SOLVER_FAILED, PlanStatus.LIMIT_REACHED):
         return plan
     convex = _plan_convex(replace(request, guess=None))
@@ -169,10 +197,10 @@ def answer_without_flight(plan: Plan, request: Request, unreachable: str) -> Pla
     problem, nodes, time_of_flight = request.problem, request.nodes, request.time_of_flight
     anywhere = False
     if unreachable == "nearest":
-        nearest = plan_nearest(problem, nodes, time_of_flight)
+        nearest = plan_nearest(problem, nodes, time_of_flight, request.provisional)
         nearest = replace(nearest, solves=plan.solves + nearest.solves)
         if nearest.status.has_flight:
-            return within_limits(nearest, lambda finer, _: plan_nearest(problem, finer, time_of_flight))
+            return nearest
         anywhere = nearest.status is PlanStatus.INFEASIBLE
         if anywhere:
             plan = replace(nearest, method=plan.method)
@@ -182,8 +210,7 @@ def answer_without_flight(plan: Plan, request: Request, unreachable: str) -> Pla
     if plan.method == "convex" and proof is not None and time_of_flight is None and not anywhere:
         retry = _plan_convex_from(request, proof.time)
         if retry.status.has_flight:
-            retry = replace(retry, solves=plan.solves + retry.solves)
-            return within_limits(retry, lambda finer, found: _plan_convex(request.finer(finer, found)))
+            return replace(retry, solves=plan.solves + retry.solves)
     if plan.status is PlanStatus.INFEASIBLE:
         message = f"{plan.message}; infeasibility could not be proved"
         return replace(plan, status=PlanStatus.LIMIT_REACHED, message=message)

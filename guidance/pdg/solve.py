@@ -16,7 +16,7 @@ from guidance.constants import MOON_GRAVITY
 from guidance.descent.plan import InfeasibleError, Plan, PlanStatus, SolverFailedError
 from guidance.descent.problem import LandingProblem
 from guidance.lander import PAPER_LANDER, Lander
-from guidance.pdg.fallbacks import Request, answer_without_flight, plan_by_method, within_limits
+from guidance.pdg.fallbacks import Request, answer
 from guidance.state import State
 from guidance.validation import finite_number, finite_vector
 
@@ -88,17 +88,36 @@ def solve_pdg(
     _check_choices(nodes, method, unreachable, guess)
     if time_of_flight is not None:
         time_of_flight = finite_number("time_of_flight", time_of_flight, above=0.0)
-    request = Request(problem, nodes, time_of_flight, method, guess)
-    plan = plan_by_method(request)
-    if plan.status is PlanStatus.OPTIMAL:
-        plan = within_limits(plan, lambda finer, found: plan_by_method(request.finer(finer, found)))
-    else:
-        plan = answer_without_flight(plan, request, unreachable)
+    plan = answer(Request(problem, nodes, time_of_flight, method, guess), unreachable)
     if problem.arrived and time_of_flight is None:
         plan = replace(plan, message=f"{plan.message}; {ARRIVED}")
     if throw and not plan.status.has_flight:
         raise _error(plan)
     return plan
+
+
+def replan(
+    problem: LandingProblem, nodes: int, time_of_flight: float | None, method: str, unreachable: str
+) -> Plan:
+    """A plan for the closed loop, which replaces it before it is flown to its end; one without a flight is not raised.
+
+    It is taken as the planner finds it: not flown first, so that it may miss a limit between nodes, and near
+    the best time of flight rather than at it. `solve_pdg` gives plans that are flown as they are.
+
+    Args:
+        problem: what to solve.
+        nodes: N.
+        time_of_flight: [s] or None to search for the best.
+        method: as in `solve_pdg`.
+        unreachable: as in `solve_pdg`.
+
+    Raises:
+        ValueError: an argument is out of range.
+    """
+    _check_choices(nodes, method, unreachable, None)
+    if time_of_flight is not None:
+        time_of_flight = finite_number("time_of_flight", time_of_flight, above=0.0)
+    return answer(Request(problem, nodes, time_of_flight, method, provisional=True), unreachable)
 
 
 def _error(plan: Plan) -> InfeasibleError | SolverFailedError:

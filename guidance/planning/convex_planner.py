@@ -23,11 +23,7 @@ from guidance.planning.minimum_propellant import (
 METHOD = "convex"
 _OVERDRAFT = 1e-9  # in ln(mass): rounding of the solver
 _REPLAN_TOLERANCE = 1.5e-5  # in ln(mass), as SHARE_TOLERANCE: 18 g at 1200 kg
-_WORTH_A_SEARCH = 0.05
-"""Gain in ln(mass), by the derivative at the refined flight, above which its time is searched anew.
-
-The presets' tables rest on it: lower, a late replan in some 200 episodes burns up to 5 % less.
-"""
+_WORTH_A_SEARCH = 4e-5  # gain in ln(mass) that a time found with relaxed bounds may promise to another time
 _ERROR_TOLERANCE = 0.02  # [m] gain in landing error below which the time search stops
 _ERROR_SLACK = 0.05  # [m] landing error granted to the least-propellant step
 
@@ -50,6 +46,7 @@ def plan_convex(
     nodes: int,
     time_of_flight: float | None = None,
     guess_time: float | None = None,
+    provisional: bool = False,
 ) -> ConvexAnswer:
     """Least propellant to the target.
 
@@ -59,6 +56,7 @@ def plan_convex(
         time_of_flight: [s] or None to search for the best.
         guess_time: [s] start of that search where the indirect method has none; None to find one on a
             coarse mesh.
+        provisional: whether a flight near the best time will do.
 
     Returns:
         A plan that is OPTIMAL, or one without a flight: INFEASIBLE means "not found, proof still to come".
@@ -76,7 +74,15 @@ def plan_convex(
         solution, solves = outcome.solution, outcome.solves
         if solution is None and outcome.cause:
             return ConvexAnswer(Plan(PlanStatus.INFEASIBLE, problem, METHOD, message=outcome.cause))
-    return _finish(task, solution, solves, PlanStatus.OPTIMAL, time_of_flight)
+    worth = _worth_a_search(time_of_flight, provisional)
+    return _finish(task, solution, solves, PlanStatus.OPTIMAL, worth)
+
+
+def _worth_a_search(time_of_flight: float | None, provisional: bool) -> float | None:
+    """Gain in ln(mass) above which a free time is searched anew; None where it is given."""
+    if time_of_flight is not None:
+        return None
+    return math.inf if provisional else _WORTH_A_SEARCH
 
 
 def _finish(
@@ -84,9 +90,13 @@ def _finish(
     found: ConvexSolution | None,
     solves: int,
     status: PlanStatus,
-    time_of_flight: float | None,
+    worth_a_search: float | None,
 ) -> ConvexAnswer:
-    """Refine a solution until the true thrust bounds hold, check the tank, and make it a Plan."""
+    """Refine a solution until the true thrust bounds hold, check the tank, and make it a Plan.
+
+    Where the time of flight is free it is searched anew if the true bounds refuse it, or promise a gain in
+    ln(mass) above `worth_a_search` at another; None keeps it.
+    """
     problem = task.problem
     message = "no feasible time of flight found"
     none = Plan(PlanStatus.INFEASIBLE, problem, METHOD, message=message, solves=solves)
@@ -99,7 +109,7 @@ def _finish(
     solution, more = task.refine(found)
     solves += more
     affordable = _affordable(problem, solution)
-    if time_of_flight is None and (not affordable or promised_gain(task, solution) > _WORTH_A_SEARCH):
+    if worth_a_search is not None and (not affordable or promised_gain(task, solution) > worth_a_search):
         outcome = minimise_with_true_bounds(
             task, SHARE_TOLERANCE, found.time, solution if affordable else None
         )
@@ -138,7 +148,9 @@ def prove_infeasible(
     return prove_free_time(task)
 
 
-def plan_nearest(problem: LandingProblem, nodes: int, time_of_flight: float | None = None) -> Plan:
+def plan_nearest(
+    problem: LandingProblem, nodes: int, time_of_flight: float | None = None, provisional: bool = False
+) -> Plan:
     """Land softly as near to the target as possible, in its plane, then with the least propellant.
 
     Three convex problems: the cheapest soft landing anywhere (which tells whether there is one), the least
@@ -182,4 +194,5 @@ def plan_nearest(problem: LandingProblem, nodes: int, time_of_flight: float | No
         last, more = outcome.solution, outcome.solves
         if last is not None and last.propellant_share > problem.log_mass_ratio + _OVERDRAFT:
             last, more = economical.solve(least.time), more + 1
-    return _finish(economical, last, solves + more, PlanStatus.NEAREST, time_of_flight).plan
+    worth = _worth_a_search(time_of_flight, provisional)
+    return _finish(economical, last, solves + more, PlanStatus.NEAREST, worth).plan

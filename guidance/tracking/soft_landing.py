@@ -2,7 +2,7 @@
 
 A least-propellant descent ends at full thrust, where a few centimetres of altitude are a metre per second of
 touchdown speed. Here the planner aims at a gate above the site: the point from which a constant deceleration
-d over a time t_d stops at the site, d t_d^2 / 2 above it, passed at the speed d t_d downward. `solve_pdg`
+d over a time t_d stops at the site, d t_d^2 / 2 above it, passed at the speed d t_d downward. the planner
 plans to rest; in a frame that moves with the gate's velocity the gate is passed at rest, and the equations of
 motion are the same.
 
@@ -21,9 +21,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from guidance.constants import MOON_GRAVITY
 from guidance.descent.plan import Plan, PlanStatus
-from guidance.descent.problem import lies_below
+from guidance.descent.problem import LandingProblem, lies_below
 from guidance.lander import Lander
-from guidance.pdg.solve import solve_pdg
+from guidance.pdg.solve import replan
 from guidance.state import State
 from guidance.tracking.reference import TrackingReference, make_reference, states_at
 from guidance.validation import finite_number, finite_vector
@@ -109,18 +109,10 @@ class _Approach:
         start = self.state.position + drift * (time_of_flight or 0.0)
         if lies_below(start, self.gate):
             return None
-        return solve_pdg(
-            State(start, self.state.velocity - drift, self.state.mass),
-            self.gate,
-            lander=self.engine,
-            gravity=self.gravity,
-            speed_limit=self.speed_limit,
-            time_of_flight=time_of_flight,
-            nodes=self.options.nodes,
-            method=self.options.method,
-            unreachable="nearest" if nearest else "raise",
-            throw=False,
-        )
+        drifting = State(start, self.state.velocity - drift, self.state.mass)
+        problem = LandingProblem(drifting, self.gate, self.engine, self.gravity, speed_limit=self.speed_limit)
+        unreachable = "nearest" if nearest else "raise"
+        return replan(problem, self.options.nodes, time_of_flight, self.options.method, unreachable)
 
     def cheapest(self, start: int, sinking: float, period: float) -> Plan | None:
         """Cheapest plan over whole numbers of control periods, searched downhill from `start` of them.
