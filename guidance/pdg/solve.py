@@ -99,7 +99,7 @@ def solve_pdg(
 def replan(
     problem: LandingProblem, nodes: int, time_of_flight: float | None, method: str, unreachable: str
 ) -> Plan:
-    """A plan for the closed loop, which replaces it before it is flown to its end; one without a flight is not raised.
+    """A plan for the closed loop, which replaces it before it is flown to its end; a failure is a status.
 
     It is taken as the planner finds it: not flown first, so that it may miss a limit between nodes, and near
     the best time of flight rather than at it. `solve_pdg` gives plans that are flown as they are.

@@ -9,7 +9,7 @@ import pytest
 from guidance.pdg.__main__ import main
 
 STATE = ["--state", "200", "100", "950", "-8", "-4", "-30", "1200", "--target", "0", "0", "50"]
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 
 
 def test_prints_and_draws(capsys, tmp_path):

@@ -5,7 +5,7 @@ import math
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from test_flight_time import Sample, hyperbola
+from timed_costs import Sample, hyperbola
 
 from guidance.flight_time.bracket_search import BracketSearch
 from guidance.flight_time.search import TimeModel

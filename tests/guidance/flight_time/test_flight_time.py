@@ -1,13 +1,13 @@
 """The search over the time of flight on costs with known optima, and the closed-form window."""
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 import pytest
 from descents import FEASIBLE, GRAVITY, IMPOSSIBLE, TARGET, feasible_start, problem_of
 from hypothesis import given
 from hypothesis import strategies as st
+from timed_costs import Sample, hyperbola
 
 from guidance import PAPER_LANDER, State
 from guidance.descent.problem import LandingProblem
@@ -15,25 +15,6 @@ from guidance.flight_time.search import TimeModel, TimeSearch
 from guidance.flight_time.time_window import TimeWindow, guess_time, time_window
 from guidance.planning.convex_task import ConvexTask
 from guidance.planning.minimum_propellant import minimise_over_time
-
-
-@dataclass(frozen=True)
-class Sample:
-    time: float
-    value: float = math.nan
-    slope: float = math.nan
-    solved: bool = True
-
-
-def hyperbola(a=1.0, b=50.0, c=8.0, feasible=(0.0, math.inf)):
-    """J' = a - b/(T - c)^2, least at c + sqrt(b/a)."""
-
-    def evaluate(time):
-        if not feasible[0] <= time <= feasible[1] or time <= c:
-            return Sample(time, solved=False)
-        return Sample(time, a * time + b / (time - c), a - b / (time - c) ** 2)
-
-    return evaluate
 
 
 def search(evaluate, window=(1.0, 100.0), guess=20.0, tolerance=1e-4, asymptote=1.0):
