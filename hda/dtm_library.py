@@ -76,7 +76,7 @@ def tile_numbers(split: str, ground: Ground | None = None) -> Sequence[int]:
     if ground is not None and isinstance(ground.terrain, OwnTerrain):
         if split != OWN_SPLIT:
             raise ValueError(f"split must be {OWN_SPLIT!r} for a terrain of your own, got {split!r}")
-        return ground.terrain.tiles
+        return ground.terrain.flown_tiles
     if split == OWN_SPLIT:
         raise ValueError(f"split {OWN_SPLIT!r} needs a terrain of your own")
     if split not in SPLITS:

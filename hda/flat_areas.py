@@ -1,7 +1,7 @@
 """Areas of one exact height in an elevation model, and how the ground around each goes on.
 
-Measured ground is continuous: beyond the shore of a flat area it climbs about as much over the first pixels as
-over the next ones, even where heights are whole metres or pixels are repeated. A value that stands for
+Measured ground is continuous: beyond the shore of a flat area it climbs about as much over the first pixels
+as over the next ones, even where heights are whole metres or pixels are repeated. A value that stands for
 unknown ground breaks off instead: most of its surroundings lie elsewhere, and are smooth among themselves.
 """
 
@@ -66,7 +66,7 @@ def _root(parents: NDArray[np.int32], place: int) -> int:
 
 @compile_kernel
 def _connect(heights: NDArray[np.float64]) -> NDArray[np.int32]:
-    """Union-find over neighbours of equal height: the parent of each pixel, by its place in row-major order."""
+    """Union-find over neighbours of equal height: the parent of each pixel, in row-major order."""
     rows, columns = heights.shape
     parents = np.arange(rows * columns).astype(np.int32)
     for row in range(rows):
@@ -83,7 +83,7 @@ def _connect(heights: NDArray[np.float64]) -> NDArray[np.int32]:
 def _follow(
     heights: NDArray[np.float64], row: int, column: int, down: int, right: int
 ) -> tuple[float, float]:
-    """Climb over the first pixels beyond (row, column), and over the next; NaN where it cannot be followed."""
+    """Climb over the first pixels beyond (row, column), and over the next; NaN where there are none."""
     rows, columns = heights.shape
     height = heights[row, column]
     known = 0
