@@ -8,6 +8,7 @@ unknown ground breaks off instead: most of its surroundings lie elsewhere, and a
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,11 +36,11 @@ class FlatAreas:
     """
 
     height: NDArray[np.float64]
-    pixels: NDArray[np.int64]
-    sides: NDArray[np.int64]
-    cliffs: NDArray[np.int64]
-    steps: NDArray[np.int64]
-    high_steps: NDArray[np.int64]
+    pixels: NDArray[Any]
+    sides: NDArray[Any]
+    cliffs: NDArray[Any]
+    steps: NDArray[Any]
+    high_steps: NDArray[Any]
 
 
 def find_flat_areas(

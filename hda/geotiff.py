@@ -102,7 +102,7 @@ class _GeoTiff:
     def __init__(self, path: Path, dataset: Any, nodata: tuple[float, ...]) -> None:
         self.path, self.dataset, self.nodata = path, dataset, nodata
         self.crs = dataset.crs
-        self.description: dict[str, Any] = {} if self.crs is None else self.crs.to_dict(projjson=True)
+        self.description = _describe(self.crs)
         self.ellipsoid = find_ellipsoid(self.description)
 
     def check(self, band: int) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -120,8 +120,10 @@ class _GeoTiff:
             raise ElevationFileError(
                 f"{path}: its pixels are {sides[1]:g} x {sides[0]:g} m; make them square: {self._advice()}"
             )
-        if self.ellipsoid is None:  # a site's own metres: they are taken as said
+        if not self.crs.is_projected:  # a site's own metres: they are taken as said
             return sides, (1.0, 1.0)
+        if self.ellipsoid is None:
+            raise ElevationFileError(f"{path}: its coordinate system is on no body; {self._advice()}")
         return self._true_sides(sides, self.ellipsoid)
 
     def _check_units(self, band: int) -> None:
@@ -202,7 +204,9 @@ class _GeoTiff:
             longitude, latitude = frame.longitude_latitude(frame.coordinates(*frame.middle()))[:, 0]
             metric = frame.pixel_metric(*frame.middle())[0]
         except UnknownScaleError:
-            return as_array
+            return (
+                f"its coordinates do not lie in that system: correct it (gdal_edit.py -a_srs), or {as_array}"
+            )
         side = float(f"{math.sqrt(min(metric[0, 0], metric[1, 1])):.2g}") or 1.0
         local = f"+proj=stere +lat_0={latitude:.4f} +lon_0={longitude:.4f} {self.ellipsoid.proj4} +units=m"
         floats = "" if np.dtype(self.dataset.dtypes[0]).kind == "f" else " -ot Float32"
@@ -212,6 +216,16 @@ class _GeoTiff:
             f"reproject it to a map of the site: gdalwarp -t_srs '{local}' -tr {side:g} {side:g} -r cubic"
             f"{floats}{source} -dstnodata nan {' '.join(names)}"
         )
+
+
+def _describe(crs: Any) -> dict[str, Any]:
+    """A coordinate system as PROJJSON; empty where there is none."""
+    from rasterio.errors import RasterioError
+
+    try:
+        return {} if crs is None else crs.to_dict(projjson=True)
+    except (RasterioError, ValueError):
+        return {}
 
 
 def _is_real(name: str) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field, fields
@@ -16,8 +17,10 @@ from hda.flat_areas import REACH, FlatAreas, find_flat_areas
 LEAST_AREA = 4
 """[pixels] Smaller areas of one height are chance."""
 
-_STRIP = 100.0  # [m] of a tile that is read at once ...
+_STRIP = 100.0  # [m] of a tile that is looked at at once, ...
+_STRIP_ROWS = 50  # ... but so many rows of pixels, ...
 _STRIP_PIXELS = 4_000_000  # ... and no more pixels than this
+_AROUND = 4 * REACH  # [pixels] of its surroundings, for pixels that are repeated a few times
 _MOST_LEVELS = 10_000
 _MOST_VALUES = 16
 _MARKERS = (-9999.0, -32767.0, -32768.0, -99999.0)
@@ -35,7 +38,8 @@ class TileSurvey:
         highest: [m] of the known heights.
         marked: height -> pixels of a value that is commonly written for unknown ground.
         impossible: height -> pixels of a value that is no height.
-        areas: of one exact height, a strip at a time.
+        looked: pixels that were looked at for areas, each once where pixels are repeated.
+        areas: of one exact height, a strip at a time, without most single pixels.
         levels: [m] whole metres that occur.
     """
 
@@ -46,6 +50,7 @@ class TileSurvey:
     highest: float = -np.inf
     marked: Counter[float] = field(default_factory=Counter)
     impossible: Counter[float] = field(default_factory=Counter)
+    looked: int = 0
     areas: list[FlatAreas] = field(default_factory=list)
     levels: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
 
@@ -83,10 +88,37 @@ def _survey_heights(
     survey.highest = max(survey.highest, float(np.nanmax(inner)))
     levels = np.union1d(survey.levels, np.round(inner[np.isfinite(inner)]))
     survey.levels = levels[:_MOST_LEVELS]
-    side = max(source.pixel_size)
+    whole = block.shape
+    block, core = _collapse(block, core)
+    survey.looked += (core[1] - core[0]) * (core[3] - core[2])
+    side = max(source.pixel_size) * math.sqrt(whole[0] * whole[1] / block.size)
     areas = find_flat_areas(block, core, 2.0 * _height_step(block) + 0.15 * side, high_step(side))
-    kept = (areas.pixels >= LEAST_AREA) | (areas.high_steps > 0)
+    kept = (areas.pixels > 1) | (areas.high_steps > 0)
     survey.areas.append(FlatAreas(*(getattr(areas, entry.name)[kept] for entry in fields(areas))))
+
+
+def _collapse(
+    block: NDArray[np.float64], core: tuple[int, int, int, int]
+) -> tuple[NDArray[np.float64], tuple[int, int, int, int]]:
+    """The same ground with each pixel once, where a file was made of larger pixels by repeating them."""
+    kept = [_first_of_each(block, axis) for axis in (0, 1)]
+    if min(np.count_nonzero(~first) for first in kept) == 0:
+        return block, core
+    before = [np.append(0, np.cumsum(first)) for first in kept]
+    bounds = before[0][core[0]], before[0][core[1]], before[1][core[2]], before[1][core[3]]
+    first_row, last_row, first_column, last_column = (int(bound) for bound in bounds)
+    thin = np.ascontiguousarray(block[kept[0]][:, kept[1]])
+    return thin, (first_row, last_row, first_column, last_column)
+
+
+def _first_of_each(block: NDArray[np.float64], axis: int) -> NDArray[np.bool_]:
+    """Which rows (columns) differ from the one before, as far as the same number of them always follows."""
+    ahead = np.moveaxis(block, axis, 0)
+    same = (ahead[1:] == ahead[:-1]) | (np.isnan(ahead[1:]) & np.isnan(ahead[:-1]))
+    changes = np.flatnonzero(~same.all(axis=1)) + 1
+    repeats = int(np.gcd.reduce(np.diff(changes))) if changes.size > 2 else 1
+    place = np.arange(len(ahead))
+    return (place == 0) | (place % repeats == changes[0] % repeats if repeats > 1 else place >= 0)
 
 
 def _read_strips(
@@ -94,11 +126,12 @@ def _read_strips(
 ) -> Iterator[tuple[NDArray[np.float64], tuple[int, int, int, int]]]:
     """Blocks with the ground around them, and where in them the strip lies."""
     width = columns[1] - columns[0]
-    step = max(1, min(round(_STRIP / source.pixel_size[0]), _STRIP_PIXELS // width))
-    left, right = max(0, columns[0] - REACH), min(source.shape[1], columns[1] + REACH)
+    step = max(_STRIP_ROWS, round(_STRIP / source.pixel_size[0]))
+    step = max(1, min(step, _STRIP_PIXELS // width))
+    left, right = max(0, columns[0] - _AROUND), min(source.shape[1], columns[1] + _AROUND)
     for first in range(rows[0], rows[1], step):
         last = min(first + step, rows[1])
-        bottom, top = max(0, first - REACH), min(source.shape[0], last + REACH)
+        bottom, top = max(0, first - _AROUND), min(source.shape[0], last + _AROUND)
         block = source.read(bottom, top, left, right)
         core = (first - bottom, last - bottom, columns[0] - left, columns[1] - left)
         yield np.ascontiguousarray(block), core

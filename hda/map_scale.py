@@ -133,6 +133,13 @@ class MapFrame:
         Raises:
             UnknownScaleError: a place lies outside of what the coordinate system covers.
         """
+        with np.errstate(all="ignore"):  # what comes of senseless coordinates is refused below
+            metric = self._metric(row, column)
+        if not np.isfinite(metric).all():
+            raise UnknownScaleError("its pixels are too small or too large")
+        return metric
+
+    def _metric(self, row: NDArray[np.float64], column: NDArray[np.float64]) -> NDArray[np.float64]:
         sides = []
         for step, (down, right) in ((self.column_step, (0.0, 1.0)), (self.row_step, (1.0, 0.0))):
             pixels = max(1.0, _STEP / (math.hypot(*step) * self.unit)) / 2.0
@@ -161,15 +168,13 @@ def find_ellipsoid(description: dict[str, Any]) -> Ellipsoid | None:
         found = find_ellipsoid(part)
         if found is not None:
             return found
-    if "ellipsoid" not in description:
-        return None
-    axes = description["ellipsoid"]
-    if "radius" in axes:
-        return Ellipsoid(_metres(axes["radius"]), _metres(axes["radius"]))
-    equatorial = _metres(axes["semi_major_axis"])
-    if "semi_minor_axis" in axes:
-        return Ellipsoid(equatorial, _metres(axes["semi_minor_axis"]))
-    return Ellipsoid(equatorial, equatorial * (1.0 - 1.0 / float(axes["inverse_flattening"])))
+    axes = description.get("ellipsoid", {})
+    equatorial = _metres(axes.get("radius", axes.get("semi_major_axis", 0.0)))
+    inverse_flattening = float(axes.get("inverse_flattening", 0.0))
+    flattening = 1.0 / inverse_flattening if inverse_flattening else 0.0
+    polar = _metres(axes["semi_minor_axis"]) if "semi_minor_axis" in axes else equatorial * (1.0 - flattening)
+    usable = all(math.isfinite(radius) and radius > 0.0 for radius in (equatorial, polar))
+    return Ellipsoid(equatorial, polar) if usable else None
 
 
 def _metres(length: Any) -> float:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hda.elevation_source import ElevationFile, ElevationFileError
+from hda.flat_areas import FlatAreas
 from hda.ground_survey import LEAST_AREA, TileSurvey, high_step
 
 LEAST_RELIEF = 0.05
@@ -27,10 +28,17 @@ MOST_RELIEF = 3000.0
 """[m] More on one tile is a value that stands for unknown ground."""
 
 _CLIFF_SHARE = 0.25  # of a value's outline; a lake's shore on the roughest ground here has 0.17
+_HIGH_SHARE = 0.9  # of an area's outline, of steps as high as no ground has them
+_PAIRS = 8  # values of which equal neighbours are found, at most, on continuous ground,
+_PAIR_SHARE = 5e-4  # as a share of a tile's pixels
 _STEPPED_GROUND = 0.01  # share of a tile in flat areas without cliffs that makes it ground of steps:
-_STEPPED_AREA = 25  # [pixels]
-_STEPPED_SIDES = 12
-_STEPPED_CLIFF_SHARE = 0.5  # of one area's outline
+_LEAST_SIDES = 12
+_LEAST_FOREIGN = 16  # [pixels] of one value on a tile of continuous ground
+_LEAST_LONELY = 25  # [pixels]
+_STEPPED_CLIFF_SHARES = ((25, 0.8), (100, 0.5), (400, 0.25))
+"""Of an area of so many small ones there: what of its outline is a cliff. Measured and generated ground of
+steps reaches 0.6, 0.21 and 0.05."""
+
 _NAMED = 10
 
 _PROBABLY = "probably a no-data value that the file does not declare"
@@ -152,7 +160,7 @@ def _refuse_values(
     stored = source.stored(height)
     also = f" (as are others: {', '.join(f'{value:.9g} m' for value, _ in others)})" if others else ""
     raise ElevationFileError(
-        f"{file}: {share:.2g} % of {name_tiles([finding.number for finding in tiles])} is exactly"
+        f"{file}: {share:.3g}% of {name_tiles([finding.number for finding in tiles])} is exactly"
         f" {height:.9g} m{also}; {_PROBABLY}: --nodata={stored} (nodata={stored} in Python) makes it unknown"
         f" ground{way_out}"
     )
@@ -160,38 +168,56 @@ def _refuse_values(
 
 def _find_filled_areas(survey: TileSurvey, pixel_size: float) -> Counter[float]:
     """Height -> pixels of values that fill areas as no ground does."""
-    height, pixels, sides, cliffs = (
-        np.concatenate([getattr(areas, name) for areas in survey.areas] or [np.empty(0)])
-        for name in ("height", "pixels", "sides", "cliffs")
-    )
-    found = _find_broken_areas(survey, height, pixels, sides, cliffs)
-    lonely = (sides == 0) & (pixels >= _STEPPED_AREA) & ~np.isin(height, list(found))
-    for value in np.unique(height[lonely]):  # nothing beside it to compare: with the rest of the tile
+    areas = _join(survey.areas)
+    chosen = _is_broken_off(areas) if _is_stepped(survey, areas) else _is_foreign(areas)
+    chosen |= (areas.pixels >= LEAST_AREA) & (areas.high_steps > _HIGH_SHARE * areas.steps)
+    found = _count(areas.height[chosen], areas.pixels[chosen])
+    lonely = (areas.sides == 0) & (areas.pixels >= _LEAST_LONELY) & ~np.isin(areas.height, list(found))
+    for value in np.unique(areas.height[lonely]):  # nothing beside it to compare: with the rest of the tile
         others = survey.levels[np.abs(survey.levels - np.round(value)) > 1.0]
         if others.size and np.abs(others - value).min() > high_step(pixel_size):
-            found[float(value)] = int(pixels[height == value].sum())
-    return found
+            found[float(value)] = int(areas.pixels[areas.height == value].sum())
+    repeats = survey.pixels / max(1, survey.looked)
+    return Counter({height: round(repeats * pixels) for height, pixels in found.items()})
 
 
-def _find_broken_areas(
-    survey: TileSurvey,
-    height: NDArray[np.float64],
-    pixels: NDArray[Any],
-    sides: NDArray[Any],
-    cliffs: NDArray[Any],
-) -> Counter[float]:
-    """Height -> pixels of values whose outline is a cliff."""
-    large = pixels >= LEAST_AREA
-    height, pixels, sides, cliffs = height[large], pixels[large], sides[large], cliffs[large]
-    even = (cliffs < _CLIFF_SHARE * sides) & (sides >= LEAST_AREA)
-    if pixels[even].sum() > _STEPPED_GROUND * survey.pixels:
-        least = max(_STEPPED_AREA, 8.0 * float(np.median(pixels)))
-        chosen = (pixels >= least) & (sides >= _STEPPED_SIDES) & (cliffs >= _STEPPED_CLIFF_SHARE * sides)
-    else:
-        _, place = np.unique(height, return_inverse=True)
-        total, broken = np.bincount(place, sides), np.bincount(place, cliffs)
-        chosen = ((total >= LEAST_AREA) & (broken >= _CLIFF_SHARE * total))[place]
-    return _count(height[chosen], pixels[chosen])
+def _join(parts: Sequence[FlatAreas]) -> FlatAreas:
+    names = [entry.name for entry in fields(FlatAreas)]
+    return FlatAreas(
+        *(np.concatenate([getattr(part, name) for part in parts] or [np.empty(0)]) for name in names)
+    )
+
+
+def _is_stepped(survey: TileSurvey, areas: FlatAreas) -> bool:
+    """Whether equal neighbours are common on the ground itself: pairs of many values, or areas of several."""
+    pairs = np.unique(areas.height[(areas.pixels > 1) & (areas.pixels < LEAST_AREA)])
+    even = (areas.cliffs < _CLIFF_SHARE * areas.sides) & (areas.sides >= LEAST_AREA)
+    even &= areas.pixels >= LEAST_AREA
+    _, value = np.unique(areas.height[even], return_inverse=True)
+    covered = np.sort(np.bincount(value, areas.pixels[even]))[:-1]  # without one that may be a void
+    return bool(
+        pairs.size > max(_PAIRS, _PAIR_SHARE * survey.looked)
+        or covered.sum() > _STEPPED_GROUND * survey.looked
+    )
+
+
+def _is_broken_off(areas: FlatAreas) -> NDArray[np.bool_]:
+    """Which areas of ground of steps are large, and end in a cliff."""
+    broken = np.zeros(areas.pixels.shape, bool)
+    for least, share in _STEPPED_CLIFF_SHARES:
+        broken |= (areas.pixels >= least) & (areas.cliffs >= share * areas.sides)
+    return broken & (areas.sides >= _LEAST_SIDES)
+
+
+def _is_foreign(areas: FlatAreas) -> NDArray[np.bool_]:
+    """Which areas of continuous ground are of a value whose areas end in cliffs."""
+    large = areas.pixels >= LEAST_AREA
+    _, value = np.unique(areas.height, return_inverse=True)
+    pixels, sides, cliffs = (
+        np.bincount(value, np.where(large, count, 0)) for count in (areas.pixels, areas.sides, areas.cliffs)
+    )
+    foreign = (pixels >= _LEAST_FOREIGN) & (sides >= _LEAST_SIDES) & (cliffs >= _CLIFF_SHARE * sides)
+    return large & foreign[value]
 
 
 def _find_spikes(survey: TileSurvey) -> Counter[float]:

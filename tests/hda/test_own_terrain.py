@@ -25,6 +25,7 @@ from hda.terrain import generate_terrain, terrain_rng
 # rasterio 1.4 multiplies affine 3 transforms the old way, inside itself.
 pytestmark = pytest.mark.filterwarnings("ignore:Use `@` matmul:PendingDeprecationWarning")
 
+DEGREES = CRS.from_proj4("+proj=longlat +R=1737400 +no_defs")
 MOON = CRS.from_proj4("+proj=stere +lat_0=-85 +lon_0=30 +R=1737400 +units=m")
 
 
@@ -178,7 +179,8 @@ def test_infinite_heights_are_unknown(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"crs": CRS.from_proj4("+proj=longlat +R=1737400 +no_defs")}, "in degrees.*gdalwarp -t_srs"),
+        ({"crs": DEGREES, "transform": Affine(1e-5, 0, 30, 0, -1e-5, -85)}, "in degrees.*gdalwarp -t_srs"),
+        ({"crs": DEGREES}, "in degrees.*do not lie in that system"),
         ({"crs": None}, "no coordinate system"),
         ({"crs": CRS.from_proj4("+proj=stere +lat_0=-85 +R=1737400 +units=km")}, "must be metres"),
         ({"transform": Affine(1, 0.5, 0, 0.5, -1, 0)}, "rotated"),
@@ -268,7 +270,7 @@ def test_a_tile_with_much_unknown_ground_is_left_out(tmp_path: Path) -> None:
     heights[:100, :501] = np.nan  # a fifth of the first tile, one column of the second
     heights[:, 1000:1049] = np.nan  # 9.8 % of the third
     np.save(tmp_path / "site.npy", heights)
-    terrain = open_own_terrain(tmp_path / "site.npy", pixel_size=2.0)
+    terrain = open_own_terrain(tmp_path / "site.npy", pixel_size=2.0, flat_is_ground=True)
     assert terrain.tiles == (1, 2)
     assert terrain.left_out == 1
     np.save(tmp_path / "holes.npy", np.full((1000, 1000), np.nan))
@@ -297,15 +299,16 @@ def test_a_file_that_holds_no_tile_is_refused(
 def test_an_undeclared_no_data_value_is_noticed(tmp_path: Path) -> None:
     heights = np.zeros((1000, 1000), np.float32)
     heights[3, 3] = -9999.0
-    terrain = open_own_terrain(write_geotiff(tmp_path / "site.tif", heights))
-    with pytest.raises(ValueError, match="no-data value that the file does not declare"):
-        cut_tile(terrain, 0)
+    path = write_geotiff(tmp_path / "site.tif", heights)
+    for flat_is_ground in (False, True):
+        with pytest.raises(ValueError, match="no-data value that the file does not declare"):
+            open_own_terrain(path, flat_is_ground=flat_is_ground)
 
 
 def test_a_file_that_changes_is_noticed(tmp_path: Path) -> None:
     path = tmp_path / "site.npy"
     np.save(path, np.zeros((1000, 1000), np.float32))
-    terrain = open_own_terrain(path)
+    terrain = open_own_terrain(path, flat_is_ground=True)
     np.save(path, np.ones((1000, 1001), np.float32))
     with pytest.raises(ValueError, match="was changed"):
         cut_tile(terrain, 0)
@@ -379,8 +382,8 @@ def test_ground_without_enough_hazard_is_refused_after_bounded_tries(cache: Path
     path = tmp_path / "smooth.npy"
     np.save(path, np.zeros((100, 100), np.float32))
     with pytest.raises(ValueError, match=r"80% hazard.*10000 draws \(the most was 0\.0%\).*hazard_share"):
-        place_preset("paper", path, pixel_size=10.0, workers=1)
-    preset = place_preset("paper", path, pixel_size=10.0, hazard_share=0.0, workers=1)
+        place_preset("paper", path, pixel_size=10.0, flat_is_ground=True, workers=1)
+    preset = place_preset("paper", path, pixel_size=10.0, flat_is_ground=True, hazard_share=0.0, workers=1)
     assert sample_scenario(preset, 0, 0, OWN_SPLIT).tile.deterministic[500, 500]
     with pytest.raises(ValueError, match="hazard_share"):
         place_preset("paper", path, pixel_size=10.0, hazard_share=1.5)
