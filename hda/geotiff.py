@@ -29,6 +29,7 @@ from hda.map_scale import (
 
 _METRE_NAMES = ("m", "metre", "meter", "metres", "meters")
 _NO_NAMES = ("", "unknown", "none", "undefined", "unspecified", "n/a", "null")
+_AS_ARRAY = "save its heights as .npy: 1 m a cell, row 0 at the south edge"
 _ROUNDING = 1e-9  # of a pixel's side: rotation terms that are rounding
 
 
@@ -169,7 +170,9 @@ class _GeoTiff:
         try:
             scale = measure_scale(self._frame(ellipsoid))
         except UnknownScaleError as error:
-            raise ElevationFileError(f"{self.path}: the scale of its map is unknown: {error}") from error
+            raise ElevationFileError(
+                f"{self.path}: the scale of its map is unknown, {error}; {_AS_ARRAY}"
+            ) from error
         deviation = max(scale.greatest_deviation, scale.residual_deviation)
         if deviation > GREATEST:
             raise ElevationFileError(
@@ -196,16 +199,15 @@ class _GeoTiff:
 
     def _advice(self) -> str:
         """How to make a file of it that can be flown over."""
-        as_array = "save its heights as .npy: 1 m a cell, row 0 at the south edge"
         if self.ellipsoid is None or not (self.crs.is_geographic or self.crs.is_projected):
-            return f"resample it to square north-up pixels in metres, or {as_array}"
+            return f"resample it to square north-up pixels in metres, or {_AS_ARRAY}"
         frame = self._frame(self.ellipsoid)
         try:
             longitude, latitude = frame.longitude_latitude(frame.coordinates(*frame.middle()))[:, 0]
             metric = frame.pixel_metric(*frame.middle())[0]
         except UnknownScaleError:
             return (
-                f"its coordinates do not lie in that system: correct it (gdal_edit.py -a_srs), or {as_array}"
+                f"its coordinates do not lie in that system: correct it (gdal_edit.py -a_srs), or {_AS_ARRAY}"
             )
         side = float(f"{math.sqrt(min(metric[0, 0], metric[1, 1])):.2g}") or 1.0
         local = f"+proj=stere +lat_0={latitude:.4f} +lon_0={longitude:.4f} {self.ellipsoid.proj4} +units=m"

@@ -112,14 +112,13 @@ class MapFrame:
             UnknownScaleError: a place lies outside of what the coordinate system covers.
         """
         from rasterio.crs import CRS
-        from rasterio.errors import RasterioError
         from rasterio.warp import transform
 
         # On the file's own ellipsoid: from there to another datum nothing is known about most bodies.
         angles = CRS.from_proj4(f"+proj=longlat {self.ellipsoid.proj4} +no_defs")
         try:
             found = np.array(transform(self.crs, angles, places[0].ravel(), places[1].ravel())[:2])
-        except (RasterioError, ValueError) as error:
+        except Exception as error:  # GDAL's own errors come through, of a private class
             raise UnknownScaleError(f"its coordinates cannot be turned into angles ({error})") from error
         if not np.isfinite(found).all() or (np.abs(found[1]) > 90.0 + 1e-9).any():
             raise UnknownScaleError("it reaches beyond what its coordinate system can show")

@@ -178,10 +178,11 @@ def cut_tile(terrain: OwnTerrain, number: int) -> NDArray[np.float64]:
 
 def _count_tiles(file: Path, source: ElevationFile) -> tuple[int, int]:
     """Rows and columns of whole tiles."""
-    if max(source.pixel_size) > COARSEST_PIXEL:
+    coarsest = max(side / scale for side, scale in zip(source.pixel_size, source.map_scale, strict=True))
+    if coarsest > COARSEST_PIXEL * (1.0 + 1e-9):
         raise ValueError(
-            f"{file}: pixels of {max(source.pixel_size):g} m; coarser than {COARSEST_PIXEL:g} m does not show"
-            " where a lander can stand"
+            f"{file}: pixels of {coarsest:g} m; coarser than {COARSEST_PIXEL:g} m does not show where a"
+            " lander can stand"
         )
     north, east = (count * side for count, side in zip(source.shape, source.pixel_size, strict=True))
     # A square kilometre of map that is a little less of ground is still a tile; its last cells are unknown.

@@ -1,4 +1,4 @@
-"""Elevation models made by chance: grounds, voids that a file does not declare, maps of known slope."""
+"""Elevation models made by chance: grounds, and voids that their files do not declare."""
 
 from dataclasses import dataclass
 from functools import cache
@@ -7,7 +7,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter, map_coordinates, zoom
 
 from hda.presets import PRESETS
-from hda.terrain import generate_terrain, terrain_rng
+from hda.terrain import TerrainParameters, generate_terrain, terrain_rng
 
 SIDES = (1.0, 2.0, 5.0, 10.0)
 FILLS = (0.0, -9999.0, -32767.0, -32768.0, -3.4028234663852886e38, 65535.0, 1e20, 255.0, 32767.0, -1e30)
@@ -27,7 +27,9 @@ class Case:
 
 @cache
 def _rough(name: str) -> np.ndarray:
-    return generate_terrain(PRESETS[name].terrain, terrain_rng(17))
+    terrain = PRESETS[name].terrain
+    assert isinstance(terrain, TerrainParameters)
+    return generate_terrain(terrain, terrain_rng(17))
 
 
 def draw_ground(rng: np.random.Generator) -> Case:
@@ -38,12 +40,12 @@ def draw_ground(rng: np.random.Generator) -> Case:
     if kind in ("paper", "hard"):
         heights = _rough(kind)[:: round(side), :: round(side)][:pixels, :pixels].copy()
     elif kind == "tracks":  # most pixels are interpolated between a few that were measured
-        coarse = gaussian_filter(rng.normal(size=(40, 40)), 2.0)
-        heights = zoom(coarse / coarse.std(), pixels / 40, order=1, grid_mode=True, mode="nearest")
-        heights *= rng.uniform(2.0, 40.0)
+        coarse = np.asarray(gaussian_filter(rng.normal(size=(40, 40)), 2.0))
+        heights = np.asarray(zoom(coarse, pixels / 40, order=1, grid_mode=True, mode="nearest"))
+        heights *= rng.uniform(2.0, 40.0) / coarse.std()
     else:
         width = rng.uniform(10.0, 120.0)
-        noise = gaussian_filter(rng.normal(size=(pixels, pixels)), width / side, mode="wrap")
+        noise = np.asarray(gaussian_filter(rng.normal(size=(pixels, pixels)), width / side, mode="wrap"))
         slope_deg = rng.uniform(0.5, 10.0) if kind == "smooth" else rng.uniform(10.0, 30.0)
         heights = noise / noise.std() * width * np.tan(np.radians(slope_deg))  # RMS slope along an axis
         heights += rng.normal(size=heights.shape) * rng.choice([0.0, 0.02, 0.2])
@@ -84,7 +86,7 @@ def draw_shape(rng: np.random.Generator, pixels: int) -> tuple[np.ndarray, str]:
         edge = max(2, round(0.1 * share * pixels))
         void = (np.minimum(row, column) < edge) | (np.maximum(row, column) >= pixels - edge)
     else:
-        field = gaussian_filter(rng.normal(size=(pixels, pixels)), 8.0)
+        field = np.asarray(gaussian_filter(rng.normal(size=(pixels, pixels)), 8.0))
         void = field > np.quantile(field, 0.9)
     return (void if rng.integers(2) else void[::-1, ::-1]), shape
 
