@@ -65,16 +65,22 @@ def open_geotiff(path: Path, band: int | None, nodata: tuple[float, ...]) -> Ite
         sides, map_scale = _GeoTiff(path, dataset, nodata).check(chosen)
         rows, scale, offset = dataset.height, dataset.scales[chosen - 1], dataset.offsets[chosen - 1]
         north_up = dataset.transform.e < 0.0
+        # GDAL makes a mask of an alpha band of whole numbers only.
+        alphas = [
+            k for k, color in enumerate(dataset.colorinterp, 1) if color.name == "alpha" and k != chosen
+        ]
 
         def read(first_row: int, last_row: int, first_column: int, last_column: int) -> NDArray[np.float64]:
             top = rows - last_row if north_up else first_row
             window = Window(first_column, top, last_column - first_column, last_row - first_row)  # pyright: ignore[reportCallIssue]
             try:
                 stored = dataset.read(chosen, window=window, masked=True)
+                seen = [dataset.read(alpha, window=window) > 0 for alpha in alphas]
             except (RasterioError, OSError, ValueError) as error:
                 raise ElevationFileError(f"{path}: a part of it cannot be read ({error})") from error
             heights = known_heights(stored.data, nodata, scale, offset)
-            heights[np.ma.getmaskarray(stored)] = np.nan
+            for known in (~np.ma.getmaskarray(stored), *seen):
+                heights[~known] = np.nan
             return heights[::-1] if north_up else heights
 
         kind = np.dtype(dataset.dtypes[chosen - 1])
@@ -111,6 +117,9 @@ class _GeoTiff:
         path, dataset = self.path, self.dataset
         if not _is_real(dataset.dtypes[band - 1]):
             raise ElevationFileError(f"{path}: heights must be real numbers, got {dataset.dtypes[band - 1]}")
+        scale, offset = dataset.scales[band - 1], dataset.offsets[band - 1]
+        if scale == 0.0 or not (math.isfinite(scale) and math.isfinite(offset)):
+            raise ElevationFileError(f"{path}: scale {scale:g} and offset {offset:g} make no heights")
         self._check_units(band)
         transform = dataset.transform
         sides = (abs(transform.e), transform.a)

@@ -134,8 +134,8 @@ class MapFrame:
         """
         with np.errstate(all="ignore"):  # what comes of senseless coordinates is refused below
             metric = self._metric(row, column)
-        if not np.isfinite(metric).all():
-            raise UnknownScaleError("its pixels are too small or too large")
+        if not np.isfinite(metric).all() or (metric[:, (0, 1), (0, 1)] <= 0.0).any():
+            raise UnknownScaleError("its pixels are too small or too large for their coordinates")
         return metric
 
     def _metric(self, row: NDArray[np.float64], column: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import rasterio
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rasterio.crs import CRS
@@ -21,44 +20,12 @@ from hda.presets import PAPER_TERRAIN, PRESETS, place_preset, sample_scenario
 from hda.resampling import axis_weights, resample
 from hda.safety_map import SafetyCriteria
 from hda.terrain import generate_terrain, terrain_rng
+from tests.ground_files import MOON, write_geotiff
 
 # rasterio 1.4 multiplies affine 3 transforms the old way, inside itself.
 pytestmark = pytest.mark.filterwarnings("ignore:Use `@` matmul:PendingDeprecationWarning")
 
 DEGREES = CRS.from_proj4("+proj=longlat +R=1737400 +no_defs")
-MOON = CRS.from_proj4("+proj=stere +lat_0=-85 +lon_0=30 +R=1737400 +units=m")
-
-
-@pytest.fixture
-def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An empty cache of terrain, with the kernels that are compiled already."""
-    from guidance.kernel import cache_folder
-
-    kernels = cache_folder() / "kernels"
-    kernels.mkdir(parents=True, exist_ok=True)
-    place = tmp_path / "cache"
-    place.mkdir()
-    (place / "kernels").symlink_to(kernels.resolve(), target_is_directory=True)
-    monkeypatch.setenv("LUNAR_HDA_CACHE", str(place))
-    dtm_library._open_or_build.cache_clear()
-    dtm_library._verified.clear()
-    return place
-
-
-def write_geotiff(path: Path, heights: np.ndarray, side: float = 1.0, **options: Any) -> Path:
-    """Write heights, whose row 0 is the south edge, the way a GeoTIFF stores them: north first."""
-    profile: dict[str, Any] = {"crs": MOON, "transform": Affine(side, 0, 5000, 0, -side, 9000), **options}
-    scale, unit = profile.pop("scale", None), profile.pop("unit", None)
-    bands = profile.pop("count", 1)
-    shape = {"height": heights.shape[0], "width": heights.shape[1], "count": bands, "dtype": heights.dtype}
-    with rasterio.open(path, "w", driver="GTiff", **shape, **profile) as stream:
-        for band in range(1, bands + 1):
-            stream.write(heights[::-1], band)
-        if scale is not None:
-            stream.scales, stream.offsets = (scale[0],), (scale[1],)
-        if unit is not None:
-            stream.units = (unit,)
-    return path
 
 
 def plane(rows: int, columns: int, side: float) -> np.ndarray:

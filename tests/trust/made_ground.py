@@ -26,7 +26,8 @@ class Case:
 
 
 @cache
-def _rough(name: str) -> np.ndarray:
+def rough_ground(name: str) -> np.ndarray:
+    """A tile of a preset's own ground; not to be written to."""
     terrain = PRESETS[name].terrain
     assert isinstance(terrain, TerrainParameters)
     return generate_terrain(terrain, terrain_rng(17))
@@ -38,7 +39,7 @@ def draw_ground(rng: np.random.Generator) -> Case:
     pixels = round(1000 / side)
     kind = str(rng.choice(["paper", "hard", "smooth", "tracks", "steep"]))
     if kind in ("paper", "hard"):
-        heights = _rough(kind)[:: round(side), :: round(side)][:pixels, :pixels].copy()
+        heights = rough_ground(kind)[:: round(side), :: round(side)][:pixels, :pixels].copy()
     elif kind == "tracks":  # most pixels are interpolated between a few that were measured
         coarse = np.asarray(gaussian_filter(rng.normal(size=(40, 40)), 2.0))
         heights = np.asarray(zoom(coarse, pixels / 40, order=1, grid_mode=True, mode="nearest"))
