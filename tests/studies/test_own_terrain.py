@@ -2,9 +2,6 @@
 
 import csv
 import json
-import os
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,8 +11,6 @@ import tyro
 
 from examples.own_terrain import write_site
 from studies.compare import Comparison, compare, plan_study
-
-ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture(scope="module")
@@ -114,24 +109,3 @@ def test_negative_values_can_be_typed(words: list[str], site: Path) -> None:
     assert options.nodata[-1] < 0.0
     assert options.flat_is_ground
     assert options.band == 1
-
-
-@pytest.mark.slow
-def test_a_ratio_can_be_asserted_in_a_plain_script(tmp_path: Path) -> None:
-    script = tmp_path / "script.py"
-    script.write_text(
-        "from studies.testing import assert_safe_ratio\n"
-        "import hda.dtm_library\n"
-        "hda.dtm_library.SPLITS['validation'] = range(1000, 1002)\n"
-        "print(assert_safe_ratio('single-divert', episodes=10, at_least=0.5).estimate)\n"
-    )
-    done = subprocess.run(
-        [sys.executable, "script.py"],
-        capture_output=True,
-        text=True,
-        cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": str(ROOT), "LUNAR_HDA_CACHE": str(tmp_path / "cache")},
-        timeout=300,
-    )
-    assert done.returncode == 0, done.stderr
-    assert float(done.stdout.split()[-1]) > 0.4
