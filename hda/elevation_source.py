@@ -55,12 +55,11 @@ def known_heights(
     A number of the file matches one of `nodata` to seven digits; beyond 1e9, where only ends of a type lie,
     to two.
     """
-    values = np.array(stored, dtype=np.float64)
-    unknown = ~np.isfinite(values)
-    for value in nodata:
-        unknown |= np.abs(values - value) <= abs(value) * (1e-7 if abs(value) < HIGHEST else 1e-2)
-    values[unknown] = np.nan
-    with np.errstate(over="ignore"):
+    with np.errstate(invalid="ignore", over="ignore"):  # what is no number is unknown below
+        values = np.array(stored, dtype=np.float64)
+        unknown = ~np.isfinite(values)
+        for value in nodata:
+            unknown |= np.abs(values - value) <= abs(value) * (1e-7 if abs(value) < HIGHEST else 1e-2)
         heights = values * scale + offset
-    heights[np.isinf(heights)] = np.nan
+    heights[unknown | np.isinf(heights)] = np.nan
     return heights

@@ -38,7 +38,8 @@ class TileSurvey:
         highest: [m] of the known heights.
         marked: height -> pixels of a value that is commonly written for unknown ground.
         impossible: height -> pixels of a value that is no height.
-        looked: pixels that were looked at for areas, each once where pixels are repeated.
+        examined: pixels that were looked at for areas: those of strips with a known height.
+        looked: the same, each once where pixels are repeated.
         areas: of one exact height, a strip at a time, without most single pixels.
         levels: [m] whole metres that occur.
     """
@@ -50,6 +51,7 @@ class TileSurvey:
     highest: float = -np.inf
     marked: Counter[float] = field(default_factory=Counter)
     impossible: Counter[float] = field(default_factory=Counter)
+    examined: int = 0
     looked: int = 0
     areas: list[FlatAreas] = field(default_factory=list)
     levels: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
@@ -88,6 +90,7 @@ def _survey_heights(
     survey.highest = max(survey.highest, float(np.nanmax(inner)))
     levels = np.union1d(survey.levels, np.round(inner[np.isfinite(inner)]))
     survey.levels = levels[:_MOST_LEVELS]
+    survey.examined += inner.size
     whole = block.shape
     block, core = _collapse(block, core)
     survey.looked += (core[1] - core[0]) * (core[3] - core[2])

@@ -150,6 +150,17 @@ def test_several_values_are_named_and_declared_together(tmp_path: Path) -> None:
     assert np.isnan(cut_tile(terrain, 0)).mean() == pytest.approx(0.07, abs=0.01)
 
 
+@pytest.mark.parametrize("repeat", [1, 2, 5])
+def test_the_share_is_that_of_the_file(tmp_path: Path, repeat: int) -> None:
+    """With pixels that are repeated, and beside unknown ground."""
+    heights = make_ground(pixels=500 // repeat)
+    heights[-60 // repeat :] = 0.0
+    heights = np.repeat(np.repeat(heights, repeat, axis=0), repeat, axis=1)
+    heights[:50] = np.nan
+    np.save(tmp_path / "site.npy", heights)
+    assert "12% of tile 0 is exactly 0 m" in refusal(tmp_path / "site.npy")
+
+
 def test_the_tiles_are_named(tmp_path: Path) -> None:
     heights = np.hstack([make_ground(seed=seed) for seed in range(3)])
     heights[:, 520:560] = 0.0
