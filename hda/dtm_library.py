@@ -15,11 +15,9 @@ import shutil
 import tempfile
 import zlib
 from collections.abc import Iterable, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import suppress
 from dataclasses import asdict, dataclass
-from functools import lru_cache
-from multiprocessing import get_context
+from functools import lru_cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -30,6 +28,7 @@ from hda.own_terrain import OWN_SPLIT, OwnTerrain, cut_tile
 from hda.safety_map import SafetyCriteria
 from hda.terrain import TerrainParameters, generate_terrain
 from hda.tile import Tile, make_tile
+from hda.worker_pool import map_in_processes
 
 FORMAT_VERSION = 1
 SPLITS: dict[str, range] = {
@@ -77,7 +76,7 @@ def tile_numbers(split: str, ground: Ground | None = None) -> Sequence[int]:
     if ground is not None and isinstance(ground.terrain, OwnTerrain):
         if split != OWN_SPLIT:
             raise ValueError(f"split must be {OWN_SPLIT!r} for a terrain of your own, got {split!r}")
-        return ground.terrain.tiles
+        return ground.terrain.flown_tiles
     if split == OWN_SPLIT:
         raise ValueError(f"split {OWN_SPLIT!r} needs a terrain of your own")
     if split not in SPLITS:
@@ -133,18 +132,13 @@ def prepare_tiles(ground: Ground, split: str, workers: int = 2, numbers: Iterabl
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns) as progress:
         task = progress.add_task(f"building {split} terrain", total=len(missing))
-        if workers == 1 or len(missing) == 1:
-            for number in missing:
-                _open_or_build(ground, number)
-                progress.advance(task)
-            return
-        with ProcessPoolExecutor(
-            workers, mp_context=get_context("spawn"), initializer=_use_one_thread
-        ) as pool:
-            futures = [pool.submit(_build_and_store, ground, number) for number in missing]
-            for future in as_completed(futures):
-                future.result()
-                progress.advance(task)
+        map_in_processes(
+            partial(_prepare, ground),
+            missing,
+            workers,
+            initializer=_use_one_thread,
+            on_done=partial(progress.advance, task),
+        )
 
 
 def remove_tiles(ground: Ground) -> None:
@@ -164,8 +158,8 @@ def _tile_folder(ground: Ground, number: int) -> Path:
     return ground.folder() / f"tile-{number:05d}"
 
 
-def _build_and_store(ground: Ground, number: int) -> None:
-    _store(ground, build_tile(ground, number))
+def _prepare(ground: Ground, number: int) -> None:
+    _open_or_build(ground, number)
 
 
 @lru_cache(maxsize=96)

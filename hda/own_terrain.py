@@ -1,7 +1,8 @@
 """A user's own ground: an elevation model from a file, cut into square kilometres at 1 m a cell.
 
 Tiles are counted from the south-west corner of the file, row by row; what is left over at its north and east
-edges is not used. A tile of which more than a tenth is unknown is left out.
+edges is not used. A tile of which more than a tenth is unknown is left out. A value that only looks like
+ground is refused (`hda.undeclared_voids`).
 """
 
 from __future__ import annotations
@@ -15,8 +16,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hda.elevation_file import ElevationFile, open_elevation
+from hda.elevation_file import ElevationFile, NoData, no_data_values, open_elevation
+from hda.ground_survey import survey_tile
+from hda.map_scale import GREATEST
 from hda.resampling import axis_weights, resample
+from hda.undeclared_voids import TileFinding, judge_tile, refuse_voids
 
 OWN_SPLIT = "own"
 TILE_SIZE = 1000
@@ -27,9 +31,6 @@ COARSEST_PIXEL = 10.0
 
 MOST_UNKNOWN = 0.1
 MOST_TILES = 10_000
-MOST_RELIEF = 3000.0
-"""[m] More than this on one tile is a no-data value that the file does not declare."""
-
 _STRIP = 100  # rows of cells that are resampled together: bounds the memory for fine pixels
 
 
@@ -40,11 +41,16 @@ class OwnTerrain:
     Attributes:
         file: where it lies; another place of the same content is the same terrain.
         sha256: of the file.
-        source_pixel: [m] side of a pixel of the file.
+        source_pixel: [m] true side of a pixel of the file, eastward.
         tile_columns: tiles from west to east; tile n is number n % tile_columns of row n // tile_columns.
         tiles: numbers of the tiles that are used.
-        left_out: tiles that are not, because more than a tenth of them is unknown.
+        left_out: how many are not, because more than a tenth of them is unknown.
         maximum_elevation: [m] each tile is shifted so that its highest cell stands here.
+        band: of the file, counted from 1.
+        nodata: stored numbers that mean unknown ground, besides the one that the file declares.
+        map_scale: true metres per metre of the map, north and east, where the pixels were corrected for it.
+        flat_is_ground: areas of one exact height were taken as ground.
+        too_safe: those of `tiles` over which no episode begins, for want of hazard around a first target.
     """
 
     file: Path = field(compare=False)
@@ -54,6 +60,16 @@ class OwnTerrain:
     tiles: tuple[int, ...]
     left_out: int = 0
     maximum_elevation: float = 50.0
+    band: int = 1
+    nodata: tuple[float, ...] = ()
+    map_scale: tuple[float, float] = (1.0, 1.0)
+    flat_is_ground: bool = False
+    too_safe: tuple[int, ...] = ()
+
+    @property
+    def flown_tiles(self) -> tuple[int, ...]:
+        """Numbers of the tiles over which episodes begin."""
+        return tuple(number for number in self.tiles if number not in self.too_safe)
 
     @property
     def resampling(self) -> str:
@@ -63,40 +79,71 @@ class OwnTerrain:
         return "cubic convolution" if self.source_pixel > 1.0 else "area average"
 
     def identity(self) -> dict[str, Any]:
-        """All that decides its tiles; not where the file lies."""
+        """All that decides its tiles; not where the file lies, nor what is flown."""
         values = asdict(self)
-        del values["file"]
+        for name in ("file", "flat_is_ground", "too_safe"):
+            del values[name]
+        for name, usual in (("band", 1), ("nodata", ()), ("map_scale", (1.0, 1.0))):
+            if values[name] == usual:
+                del values[name]
         return {**values, "resampling": self.resampling}
 
     def description(self) -> dict[str, Any]:
-        """For the provenance: the name of the file and all that decides the tiles."""
-        return {"file": self.file.name, **self.identity()}
+        """For the provenance: the name of the file, all that decides the tiles, and what is not flown."""
+        choices = {"flat_is_ground": self.flat_is_ground, "too_safe": self.too_safe}
+        return {"file": self.file.name, **self.identity(), **choices}
 
 
-def open_own_terrain(file: Path, pixel_size: float | None = None) -> OwnTerrain:
+def open_own_terrain(
+    file: Path,
+    pixel_size: float | None = None,
+    *,
+    band: int | None = None,
+    nodata: NoData = None,
+    flat_is_ground: bool = False,
+) -> OwnTerrain:
     """Read what an elevation model holds, and choose the tiles.
 
     Args:
-        file: GeoTIFF in a projected coordinate system in metres, or .npy with row 0 at the south edge.
+        file: GeoTIFF in a coordinate system in metres, or .npy with row 0 at the south edge.
         pixel_size: [m] of an .npy file; 1 if left out.
+        band: of a GeoTIFF, counted from 1; needed where there are several.
+        nodata: numbers in the file that mean unknown ground, one or several, besides that which it declares.
+        flat_is_ground: an area of one exact height is ground, though it looks like a value that stands for
+            unknown ground.
 
     Raises:
-        ElevationFileError: the file is missing, damaged, foreign, or not in metres.
+        ElevationFileError: the file is missing, damaged, foreign, not in metres, on a map of another scale,
+            or holds a value that looks like unknown ground.
         ValueError: it is coarser than the lander, smaller than a tile, too large, or has no tile whose ground
-            is known.
+            is known; or an argument is out of range.
     """
     file = file.expanduser().resolve()
-    with open_elevation(file, pixel_size) as source:
+    with open_elevation(file, pixel_size, band=band, nodata=nodata) as source:
         tile_rows, tile_columns = _count_tiles(file, source)
-        numbers = range(tile_rows * tile_columns)
-        tiles = tuple(n for n in numbers if _unknown_share(source, n, tile_columns) <= MOST_UNKNOWN)
-        if not tiles:
+        findings = [
+            _look_at_tile(source, number, tile_columns, not flat_is_ground)
+            for number in range(tile_rows * tile_columns)
+        ]
+        used = [finding for finding in findings if finding.unknown_share <= MOST_UNKNOWN]
+        if not used:
             raise ValueError(
                 f"{file}: more than {MOST_UNKNOWN:.0%} of every {TILE_SIZE} x {TILE_SIZE} m is unknown"
-                " ground; cut out a part with fewer holes, e.g. with gdal_translate -projwin"
+                f" ground; cut out a part with fewer holes{_cutting(file)}"
             )
-        side = source.pixel_size[1]
-    return OwnTerrain(file, _digest(file), side, tile_columns, tiles, len(numbers) - len(tiles))
+        refuse_voids(file, source, used, flat_is_ground)
+    return OwnTerrain(
+        file,
+        _digest(file),
+        source.pixel_size[1],
+        tile_columns,
+        tuple(finding.number for finding in used),
+        len(findings) - len(used),
+        band=1 if band is None else band,
+        nodata=no_data_values(nodata),
+        map_scale=source.map_scale,
+        flat_is_ground=flat_is_ground,
+    )
 
 
 def cut_tile(terrain: OwnTerrain, number: int) -> NDArray[np.float64]:
@@ -104,38 +151,43 @@ def cut_tile(terrain: OwnTerrain, number: int) -> NDArray[np.float64]:
 
     Raises:
         ElevationFileError: the file cannot be read any more.
-        ValueError: it is not the file that was opened, or a tile's heights cannot be real.
+        ValueError: it is not the file that was opened.
     """
     if _digest(terrain.file) != terrain.sha256:
         raise ValueError(f"{terrain.file} was changed since it was opened")
     row, column = divmod(number, terrain.tile_columns)
     pixel_size = terrain.source_pixel if terrain.file.suffix.lower() == ".npy" else None
-    heights = np.empty((TILE_SIZE, TILE_SIZE))
-    with open_elevation(terrain.file, pixel_size) as source:
+    heights = np.full((TILE_SIZE, TILE_SIZE), np.nan)
+    with open_elevation(terrain.file, pixel_size, band=terrain.band, nodata=terrain.nodata) as source:
         (rows, columns), (side_north, side_east) = source.shape, source.pixel_size
-        east = axis_weights(column * TILE_SIZE, TILE_SIZE, side_east, columns)
-        for first in range(0, TILE_SIZE, _STRIP):
-            north = axis_weights(row * TILE_SIZE + first, _STRIP, side_north, rows)
-            pixels = source.read(north.first, north.last, east.first, east.last)
-            heights[first : first + _STRIP] = resample(pixels, north, east)
-    relief = np.nanmax(heights) - np.nanmin(heights) if np.isfinite(heights).any() else 0.0
-    if relief > MOST_RELIEF:
-        raise ValueError(
-            f"{terrain.file}: tile {number} has heights from {np.nanmin(heights):g} to {np.nanmax(heights):g}"
-            " m; probably a no-data value that the file does not declare (gdal_edit.py -a_nodata VALUE)"
+        first_north, first_east = row * TILE_SIZE, column * TILE_SIZE
+        cells_north, cells_east = (
+            min(TILE_SIZE, int(count * side + 1e-6) - first)
+            for count, side, first in zip(
+                source.shape, source.pixel_size, (first_north, first_east), strict=True
+            )
         )
+        east = axis_weights(first_east, cells_east, side_east, columns)
+        for first in range(0, cells_north, _STRIP):
+            last = min(first + _STRIP, cells_north)
+            north = axis_weights(first_north + first, last - first, side_north, rows)
+            pixels = source.read(north.first, north.last, east.first, east.last)
+            heights[first:last, :cells_east] = resample(pixels, north, east)
     return heights
 
 
 def _count_tiles(file: Path, source: ElevationFile) -> tuple[int, int]:
     """Rows and columns of whole tiles."""
-    if max(source.pixel_size) > COARSEST_PIXEL:
+    coarsest = max(side / scale for side, scale in zip(source.pixel_size, source.map_scale, strict=True))
+    if coarsest > COARSEST_PIXEL * (1.0 + 1e-9):
         raise ValueError(
-            f"{file}: pixels of {max(source.pixel_size):g} m; coarser than {COARSEST_PIXEL:g} m does not show"
-            " where a lander can stand"
+            f"{file}: pixels of {coarsest:g} m; coarser than {COARSEST_PIXEL:g} m does not show where a"
+            " lander can stand"
         )
     north, east = (count * side for count, side in zip(source.shape, source.pixel_size, strict=True))
-    tile_rows, tile_columns = (int((extent + 1e-6) // TILE_SIZE) for extent in (north, east))
+    # A square kilometre of map that is a little less of ground is still a tile; its last cells are unknown.
+    short = GREATEST * TILE_SIZE if source.map_scale != (1.0, 1.0) else 1e-6
+    tile_rows, tile_columns = (int((extent + short) // TILE_SIZE) for extent in (north, east))
     if tile_rows * tile_columns == 0:
         raise ValueError(
             f"{file}: covers {east:g} x {north:g} m; at least {TILE_SIZE} x {TILE_SIZE} m are needed"
@@ -143,23 +195,25 @@ def _count_tiles(file: Path, source: ElevationFile) -> tuple[int, int]:
     if tile_rows * tile_columns > MOST_TILES:
         raise ValueError(
             f"{file}: covers {east:g} x {north:g} m, more than {MOST_TILES} tiles; cut out a part of it"
+            f"{_cutting(file)}"
         )
     return tile_rows, tile_columns
 
 
-def _unknown_share(source: ElevationFile, number: int, tile_columns: int) -> float:
-    """Share of the file's pixels on a tile whose height is unknown."""
-    first_row, last_row, first_column, last_column = (
-        round((place + step) * TILE_SIZE / side)
-        for place, side in zip(divmod(number, tile_columns), source.pixel_size, strict=True)
-        for step in (0, 1)
+def _cutting(file: Path) -> str:
+    """With what a part of a file is cut out."""
+    return "" if file.suffix.lower() == ".npy" else ", e.g. with gdal_translate -projwin"
+
+
+def _look_at_tile(source: ElevationFile, number: int, tile_columns: int, markers: bool) -> TileFinding:
+    """Read the file's pixels on a tile, and judge them."""
+    rows, columns = (
+        (round(place * TILE_SIZE / side), min(count, round((place + 1) * TILE_SIZE / side)))
+        for place, side, count in zip(
+            divmod(number, tile_columns), source.pixel_size, source.shape, strict=True
+        )
     )
-    unknown = 0
-    step = max(1, round(_STRIP / source.pixel_size[0]))
-    for first in range(first_row, last_row, step):
-        part = source.read(first, min(first + step, last_row), first_column, last_column)
-        unknown += int(np.isnan(part).sum())
-    return unknown / ((last_row - first_row) * (last_column - first_column))
+    return judge_tile(survey_tile(source, number, rows, columns, markers), max(source.pixel_size))
 
 
 def _digest(file: Path) -> str:

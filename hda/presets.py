@@ -12,15 +12,15 @@ from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
-from hda.dtm_library import Ground, load_tile, prepare_tiles, tile_numbers
+from hda.dtm_library import Ground, load_tile, tile_numbers
+from hda.elevation_file import NoData
 from hda.islands import IslandField
 from hda.lidar import Lidar
-from hda.own_terrain import OWN_SPLIT, open_own_terrain
+from hda.own_preset import place_on_terrain
+from hda.own_terrain import open_own_terrain
 from hda.random_streams import EpisodeStreams
 from hda.rocks import RockPopulation
-from hda.scenario import Preset, Rules, Scenario, draw_scenario, draw_target
+from hda.scenario import Preset, Rules, Scenario, draw_scenario
 from hda.terrain import TerrainParameters
 
 BLOCKY_ROCKS = RockPopulation(area_fraction=0.3, decay_constant=0.6, decay_slope=0.0)
@@ -72,18 +72,26 @@ def place_preset(
     file: Path,
     *,
     pixel_size: float | None = None,
+    band: int | None = None,
+    nodata: NoData = None,
+    flat_is_ground: bool = False,
     hazard_share: float | None = None,
     workers: int = 2,
 ) -> Preset:
     """Put a setting on a user's own ground: the same rules, starts, sensor and lander on their terrain.
 
-    Every tile is built, cached, and tried for a first target, so that what cannot be flown fails here.
+    Every tile is built, cached, and tried for first targets, so that what cannot be flown fails here. A tile
+    with too few of them is left out and named on stderr; `preset.terrain.too_safe` holds its number.
     Scenarios are then drawn with `split="own"`.
 
     Args:
         preset: name of a preset, or a Preset.
         file: GeoTIFF or .npy, see `hda.own_terrain.open_own_terrain`.
         pixel_size: [m] of an .npy file; 1 if left out.
+        band: of a GeoTIFF, counted from 1; needed where there are several.
+        nodata: numbers in the file that mean unknown ground, one or several, besides that which it declares.
+        flat_is_ground: an area of one exact height is ground, though it looks like a value that stands for
+            unknown ground.
         hazard_share: in place of the preset's; a smaller one lets episodes begin over safer ground.
         workers: processes that build tiles.
 
@@ -91,19 +99,14 @@ def place_preset(
         The preset, named after both.
 
     Raises:
-        ValueError: an argument is out of range, the file cannot be used, or a tile has no place for a first
-            target.
+        ValueError: an argument is out of range, the file cannot be used, or no tile has enough places for a
+            first target.
     """
     setting = find_preset(preset)
-    start = setting.start if hazard_share is None else replace(setting.start, hazard_share=hazard_share)
-    terrain = open_own_terrain(file, pixel_size)
-    placed = replace(setting, name=f"{setting.name}-{terrain.file.stem}", terrain=terrain, start=start)
-    ground = Ground(terrain, placed.criteria)
-    prepare_tiles(ground, OWN_SPLIT, workers)
-    for number in terrain.tiles:
-        tile = load_tile(ground, number, OWN_SPLIT)
-        draw_target(tile, start, terrain.maximum_elevation, np.random.default_rng(number))
-    return placed
+    if hazard_share is not None:
+        setting = replace(setting, start=replace(setting.start, hazard_share=hazard_share))
+    terrain = open_own_terrain(file, pixel_size, band=band, nodata=nodata, flat_is_ground=flat_is_ground)
+    return place_on_terrain(setting, terrain, workers)
 
 
 def unknown_name(kind: str, name: object, valid: Iterable[str]) -> str:

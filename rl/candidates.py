@@ -8,14 +8,14 @@ arXiv 1803.05407).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
-from multiprocessing import get_context
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hda.worker_pool import map_in_processes
 from rl.artefacts import Tensors
 
 if TYPE_CHECKING:
@@ -96,17 +96,7 @@ def _score_all(flights: Sequence[_Flights], workers: int, task: str) -> list[Sco
 
     with Progress() as progress:
         bar = progress.add_task(task, total=len(flights))
-        if workers == 1 or len(flights) < 2:
-            scores = []
-            for flight in flights:
-                scores.append(flight.score())
-                progress.advance(bar)
-            return scores
-        with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-            futures = [pool.submit(flight.score) for flight in flights]
-            for _ in as_completed(futures):
-                progress.advance(bar)
-            return [future.result() for future in futures]
+        return map_in_processes(_Flights.score, flights, workers, on_done=partial(progress.advance, bar))
 
 
 def best_of_run(run: Path, choice: Choice, workers: int) -> Candidate:

@@ -58,6 +58,10 @@ class Comparison:
         split: tile split: validation or fresh to evaluate, tuning for choices.
         terrain: ground of your own in place of the preset's, GeoTIFF or .npy (1 m a cell, row 0 south); the
             split is then `own`.
+        band: of your terrain's GeoTIFF, counted from 1; needed where there are several.
+        nodata: numbers in your terrain's file that mean unknown ground, besides that which it declares.
+        flat_is_ground: areas of one exact height on your terrain are ground, not a value for unknown
+            ground.
         hazard_share: least share of unsafe ground around a first target on your terrain, 0 to 1; the preset's
             by default.
         workers: processes of this machine; changes nothing but the time.
@@ -77,6 +81,9 @@ class Comparison:
     study_seed: int = 0
     split: str = "validation"
     terrain: Path | None = None
+    band: int | None = None
+    nodata: tuple[float, ...] = ()
+    flat_is_ground: bool = False
     hazard_share: float | None = None
     workers: int = 2
     scheduler: str | None = None
@@ -110,13 +117,20 @@ def choose_ground(options: Comparison) -> tuple[Preset, str]:
         ValueError: the preset is unknown, or the terrain cannot be flown over.
     """
     if options.terrain is None:
-        if options.hazard_share is not None:
-            raise ValueError("hazard_share is for a terrain of your own: give --terrain too")
+        for name in ("hazard_share", "band", "nodata", "flat_is_ground"):
+            if getattr(options, name) != getattr(Comparison, name):
+                raise ValueError(f"{name} is for a terrain of your own: give --terrain too")
         return find_preset(options.preset), options.split
     if options.split not in (Comparison.split, OWN_SPLIT):
         raise ValueError(f"split must be {OWN_SPLIT!r} with a terrain of your own, got {options.split!r}")
     preset = place_preset(
-        options.preset, options.terrain, hazard_share=options.hazard_share, workers=options.workers
+        options.preset,
+        options.terrain,
+        band=options.band,
+        nodata=options.nodata,
+        flat_is_ground=options.flat_is_ground,
+        hazard_share=options.hazard_share,
+        workers=options.workers,
     )
     return preset, OWN_SPLIT
 

@@ -7,6 +7,7 @@ any order, and the bytes of a study do not depend on which executor flew it.
 from __future__ import annotations
 
 import os
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
@@ -46,6 +47,14 @@ def local_processes(workers: int) -> Iterator[Executor | None]:
         yield pool
     finally:
         pool.shutdown(cancel_futures=True)
+
+
+def advise_script() -> str:
+    """What a script must do whose workers die since they run it again; empty where no script runs."""
+    main = sys.modules["__main__"]
+    if getattr(main, "__spec__", None) is not None or not hasattr(main, "__file__"):
+        return ""
+    return '; a script must call for a study under `if __name__ == "__main__":`, since every worker reads it'
 
 
 def _end_with_parent() -> None:

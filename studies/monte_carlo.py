@@ -22,7 +22,7 @@ from hda.episode import fly
 from hda.presets import sample_scenario
 from hda.registry import AnyPolicy, make_policy, policy_entry
 from hda.scenario import Preset
-from studies.executor import ClusterExecutor, OpenExecutor, WorkerDiedError
+from studies.executor import ClusterExecutor, OpenExecutor, WorkerDiedError, advise_script
 from studies.rows import EpisodeRow, summarize_episode
 
 CHUNK_EPISODES = 10
@@ -170,6 +170,7 @@ def fly_chunks(
                 raise WorkerDiedError(
                     f"a worker process died {attempts} times while it held episodes {first} to {last - 1}"
                     " (out of memory, or killed); a smaller number of workers needs less memory"
+                    + advise_script()
                 )
             waiting.appendleft((first, last, attempts + 1))
 

@@ -165,9 +165,9 @@ def _by_cvxpy(problem: LandingProblem, nodes: int, time_of_flight: float | None)
 
 def _forget_cvxpy_model() -> None:
     """Drop the compiled models, so that the next call states and compiles its problem anew."""
-    from guidance.reference import cvxpy_planner as reference_cvxpy
+    from guidance.reference import cvxpy_planner
 
-    reference_cvxpy.forget_models()
+    cvxpy_planner.forget_models()
 
 
 def timed_methods() -> list[Method]:

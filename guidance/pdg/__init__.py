@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from guidance.exports import lazy_exports
 
 if TYPE_CHECKING:
-    from guidance.pdg.solve import DEFAULT_NODES, METHODS, solve_pdg
+    from guidance.pdg.solve import DEFAULT_NODES, METHODS, replan, solve_pdg
 
 _HOMES = {
     "guidance.pdg.solve": (
@@ -22,6 +22,7 @@ _HOMES = {
 __all__ = [
     "DEFAULT_NODES",
     "METHODS",
+    "replan",
     "solve_pdg",
 ]
 

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import rasterio
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rasterio.crs import CRS
@@ -21,43 +20,12 @@ from hda.presets import PAPER_TERRAIN, PRESETS, place_preset, sample_scenario
 from hda.resampling import axis_weights, resample
 from hda.safety_map import SafetyCriteria
 from hda.terrain import generate_terrain, terrain_rng
+from tests.ground_files import MOON, write_geotiff
 
 # rasterio 1.4 multiplies affine 3 transforms the old way, inside itself.
 pytestmark = pytest.mark.filterwarnings("ignore:Use `@` matmul:PendingDeprecationWarning")
 
-MOON = CRS.from_proj4("+proj=stere +lat_0=-85 +lon_0=30 +R=1737400 +units=m")
-
-
-@pytest.fixture
-def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An empty cache of terrain, with the kernels that are compiled already."""
-    from guidance.kernel import cache_folder
-
-    kernels = cache_folder() / "kernels"
-    kernels.mkdir(parents=True, exist_ok=True)
-    place = tmp_path / "cache"
-    place.mkdir()
-    (place / "kernels").symlink_to(kernels.resolve(), target_is_directory=True)
-    monkeypatch.setenv("LUNAR_HDA_CACHE", str(place))
-    dtm_library._open_or_build.cache_clear()
-    dtm_library._verified.clear()
-    return place
-
-
-def write_geotiff(path: Path, heights: np.ndarray, side: float = 1.0, **options: Any) -> Path:
-    """Write heights, whose row 0 is the south edge, the way a GeoTIFF stores them: north first."""
-    profile: dict[str, Any] = {"crs": MOON, "transform": Affine(side, 0, 5000, 0, -side, 9000), **options}
-    scale, unit = profile.pop("scale", None), profile.pop("unit", None)
-    bands = profile.pop("count", 1)
-    shape = {"height": heights.shape[0], "width": heights.shape[1], "count": bands, "dtype": heights.dtype}
-    with rasterio.open(path, "w", driver="GTiff", **shape, **profile) as stream:
-        for band in range(1, bands + 1):
-            stream.write(heights[::-1], band)
-        if scale is not None:
-            stream.scales, stream.offsets = (scale[0],), (scale[1],)
-        if unit is not None:
-            stream.units = (unit,)
-    return path
+DEGREES = CRS.from_proj4("+proj=longlat +R=1737400 +no_defs")
 
 
 def plane(rows: int, columns: int, side: float) -> np.ndarray:
@@ -178,7 +146,8 @@ def test_infinite_heights_are_unknown(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"crs": CRS.from_proj4("+proj=longlat +R=1737400 +no_defs")}, "in degrees.*gdalwarp -t_srs"),
+        ({"crs": DEGREES, "transform": Affine(1e-5, 0, 30, 0, -1e-5, -85)}, "in degrees.*gdalwarp -t_srs"),
+        ({"crs": DEGREES}, "in degrees.*do not lie in that system"),
         ({"crs": None}, "no coordinate system"),
         ({"crs": CRS.from_proj4("+proj=stere +lat_0=-85 +R=1737400 +units=km")}, "must be metres"),
         ({"transform": Affine(1, 0.5, 0, 0.5, -1, 0)}, "rotated"),
@@ -268,7 +237,7 @@ def test_a_tile_with_much_unknown_ground_is_left_out(tmp_path: Path) -> None:
     heights[:100, :501] = np.nan  # a fifth of the first tile, one column of the second
     heights[:, 1000:1049] = np.nan  # 9.8 % of the third
     np.save(tmp_path / "site.npy", heights)
-    terrain = open_own_terrain(tmp_path / "site.npy", pixel_size=2.0)
+    terrain = open_own_terrain(tmp_path / "site.npy", pixel_size=2.0, flat_is_ground=True)
     assert terrain.tiles == (1, 2)
     assert terrain.left_out == 1
     np.save(tmp_path / "holes.npy", np.full((1000, 1000), np.nan))
@@ -297,15 +266,16 @@ def test_a_file_that_holds_no_tile_is_refused(
 def test_an_undeclared_no_data_value_is_noticed(tmp_path: Path) -> None:
     heights = np.zeros((1000, 1000), np.float32)
     heights[3, 3] = -9999.0
-    terrain = open_own_terrain(write_geotiff(tmp_path / "site.tif", heights))
-    with pytest.raises(ValueError, match="no-data value that the file does not declare"):
-        cut_tile(terrain, 0)
+    path = write_geotiff(tmp_path / "site.tif", heights)
+    for flat_is_ground in (False, True):
+        with pytest.raises(ValueError, match="no-data value that the file does not declare"):
+            open_own_terrain(path, flat_is_ground=flat_is_ground)
 
 
 def test_a_file_that_changes_is_noticed(tmp_path: Path) -> None:
     path = tmp_path / "site.npy"
     np.save(path, np.zeros((1000, 1000), np.float32))
-    terrain = open_own_terrain(path)
+    terrain = open_own_terrain(path, flat_is_ground=True)
     np.save(path, np.ones((1000, 1001), np.float32))
     with pytest.raises(ValueError, match="was changed"):
         cut_tile(terrain, 0)
@@ -379,8 +349,8 @@ def test_ground_without_enough_hazard_is_refused_after_bounded_tries(cache: Path
     path = tmp_path / "smooth.npy"
     np.save(path, np.zeros((100, 100), np.float32))
     with pytest.raises(ValueError, match=r"80% hazard.*10000 draws \(the most was 0\.0%\).*hazard_share"):
-        place_preset("paper", path, pixel_size=10.0, workers=1)
-    preset = place_preset("paper", path, pixel_size=10.0, hazard_share=0.0, workers=1)
+        place_preset("paper", path, pixel_size=10.0, flat_is_ground=True, workers=1)
+    preset = place_preset("paper", path, pixel_size=10.0, flat_is_ground=True, hazard_share=0.0, workers=1)
     assert sample_scenario(preset, 0, 0, OWN_SPLIT).tile.deterministic[500, 500]
     with pytest.raises(ValueError, match="hazard_share"):
         place_preset("paper", path, pixel_size=10.0, hazard_share=1.5)

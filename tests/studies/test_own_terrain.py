@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import tyro
 
 from examples.own_terrain import write_site
 from studies.compare import Comparison, compare, plan_study
@@ -49,6 +50,10 @@ def test_a_study_over_own_ground(site: Path, tmp_path: Path) -> None:
     [
         ({"split": "tuning"}, "split must be 'own'"),
         ({"terrain": None, "hazard_share": 0.1}, "hazard_share is for a terrain of your own"),
+        ({"terrain": None, "nodata": (0.0,)}, "nodata is for a terrain of your own"),
+        ({"terrain": None, "band": 1}, "band is for a terrain of your own"),
+        ({"terrain": None, "flat_is_ground": True}, "flat_is_ground is for a terrain of your own"),
+        ({"band": 2}, "band is for GeoTIFF files"),
         ({"terrain": None, "split": "own"}, "needs a terrain of your own"),
         ({"terrain": Path("none.tif")}, "no such file"),
     ],
@@ -66,3 +71,41 @@ def test_the_policies_meet_the_same_ground(site: Path) -> None:
     study = plan_study(Comparison(episodes=1, policies=("oracle",), terrain=site, workers=1))
     assert study.preset.name == "paper-site"
     assert study.split == "own"
+
+
+@pytest.mark.slow
+def test_a_tile_without_hazard_does_not_stop_the_study(
+    site: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    heights = np.load(site, allow_pickle=False)
+    smooth = np.random.default_rng(0).normal(scale=1e-3, size=heights.shape) + 0.01 * np.arange(1000)
+    smooth[:, :30] = -9999.0
+    np.save(tmp_path / "two.npy", np.hstack([smooth, heights]))
+    options = Comparison(
+        episodes=3,
+        policies=("no-divert", "single-divert"),
+        terrain=tmp_path / "two.npy",
+        workers=1,
+        out=tmp_path / "study",
+        figures=False,
+        report=False,
+    )
+    with pytest.raises(ValueError, match=r"3% of tile 0 is exactly -9999 m.*--nodata=-9999"):
+        compare(options)
+    compare(replace(options, nodata=(-9999.0,)))
+    assert "two.npy: 1 of 2 tiles are not flown over, tile 0" in capsys.readouterr().err
+    terrain = json.loads((tmp_path / "study" / "provenance.json").read_text())["preset"]["terrain"]
+    assert terrain["too_safe"] == [0]
+    assert terrain["nodata"] == [-9999.0]
+    with (tmp_path / "study" / "episodes.csv").open(newline="") as stream:
+        assert {row["tile"] for row in csv.DictReader(stream)} == {"1"}
+
+
+@pytest.mark.parametrize(
+    "words", [["--nodata", "-9999"], ["--nodata=-3.4e+38"], ["--nodata", "0", "-3.4e+38"]]
+)
+def test_negative_values_can_be_typed(words: list[str], site: Path) -> None:
+    options = tyro.cli(Comparison, args=["--terrain", str(site), *words, "--flat-is-ground", "--band", "1"])
+    assert options.nodata[-1] < 0.0
+    assert options.flat_is_ground
+    assert options.band == 1

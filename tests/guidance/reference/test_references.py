@@ -58,7 +58,7 @@ def test_cvxpy_model_is_disciplined_parametrised():
 
 
 def test_references_count_their_solves_and_forget_on_demand():
-    from guidance.reference import cvxpy_planner as reference_cvxpy
+    from guidance.reference import cvxpy_planner
 
     start, target = [180.0, 120.0, 940.0, -7.0, -4.0, -28.0, 1200.0], [0.0, 0.0, 50.0]
     fixed = guidance.solve_pdg(start, target, method="cvxpy", nodes=15, time_of_flight=29.0)
@@ -66,8 +66,8 @@ def test_references_count_their_solves_and_forget_on_demand():
     assert 1 <= fixed.solves <= 7
     assert free.solves > 10
     assert guidance.solve_pdg(start, target, method="casadi", nodes=15).solves == 1
-    reference_cvxpy.forget_models()
-    assert reference_cvxpy._model.cache_info().currsize == 0
+    cvxpy_planner.forget_models()
+    assert cvxpy_planner._model.cache_info().currsize == 0
 
 
 PAPER = ([180.0, 120.0, 940.0, -7.0, -4.0, -28.0, 1200.0], [0.0, 0.0, 50.0])
@@ -100,10 +100,9 @@ def test_limits_that_fatrop_does_not_solve_reliably_go_to_ipopt(limits):
 @pytest.mark.parametrize("breakage", ["gives up", "raises", "is absent"])
 def test_ipopt_takes_over_where_fatrop_fails(monkeypatch, breakage):
     """Labelled and counted; and the same plan as IPOPT alone."""
-    from guidance.reference import casadi_planner as reference_casadi
-    from guidance.reference import nonlinear_program
+    from guidance.reference import casadi_planner, nonlinear_program
 
-    whole = reference_casadi.nonlinear_program
+    whole = casadi_planner.nonlinear_program
 
     class Failing:
         def __call__(self, **_):
@@ -121,7 +120,7 @@ def test_ipopt_takes_over_where_fatrop_fails(monkeypatch, breakage):
     if breakage == "is absent":
         monkeypatch.setattr(nonlinear_program, "fatrop_present", lambda: False)
     else:
-        monkeypatch.setattr(reference_casadi, "nonlinear_program", broken)
+        monkeypatch.setattr(casadi_planner, "nonlinear_program", broken)
     plan = plan_casadi(paper_problem(), 31)
     alone = plan_casadi(paper_problem(), 31, solver="ipopt")
     assert plan.status is guidance.PlanStatus.OPTIMAL
