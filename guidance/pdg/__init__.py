@@ -15,6 +15,7 @@ _HOMES = {
     "guidance.pdg.solve": (
         "DEFAULT_NODES",
         "METHODS",
+        "replan",
         "solve_pdg",
     ),
 }
