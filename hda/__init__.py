@@ -10,32 +10,32 @@ import hda.own_guidance  # noqa: F401 - before anything of `guidance`: another o
 from guidance.exports import lazy_exports
 
 if TYPE_CHECKING:
-    from hda.dtm_library import SPLITS, Ground, load_tile, prepare_tiles
-    from hda.episode import EpisodeRecord, fly
-    from hda.lidar import Lidar
-    from hda.observation import Observation, ScenarioView
-    from hda.outcome import Ending, Outcome
+    from hda.ground.library import SPLITS, Ground, load_tile, prepare_tiles
+    from hda.flight.episode import EpisodeRecord, fly
+    from hda.sensing.lidar import Lidar
+    from hda.task.observation import Observation, ScenarioView
+    from hda.flight.outcome import Ending, Outcome
     from hda.policy import Decision, DecisionStatus, Policy, PrivilegedPolicy, ZemZevCommand
-    from hda.presets import PRESETS, place_preset, sample_scenario
+    from hda.task.presets import PRESETS, place_preset, sample_scenario
     from hda.registry import PolicyEntry, make_policy, policy_names, register_policy
-    from hda.safety_map import SafetyCriteria, SafetyMap, assess_safety
-    from hda.scenario import Preset, Rules, Scenario, StartConditions
-    from hda.terrain import TerrainParameters, generate_terrain
-    from hda.tile import Tile, make_tile
+    from hda.safety.safety_map import SafetyCriteria, SafetyMap, assess_safety
+    from hda.task.scenario import Preset, Rules, Scenario, StartConditions
+    from hda.terrain.generator import TerrainParameters, generate_terrain
+    from hda.ground.tile import Tile, make_tile
 
 _HOMES = {
-    "hda.dtm_library": ("SPLITS", "Ground", "load_tile", "prepare_tiles"),
-    "hda.episode": ("EpisodeRecord", "fly"),
-    "hda.lidar": ("Lidar",),
-    "hda.observation": ("Observation", "ScenarioView"),
-    "hda.outcome": ("Ending", "Outcome"),
+    "hda.ground.library": ("SPLITS", "Ground", "load_tile", "prepare_tiles"),
+    "hda.flight.episode": ("EpisodeRecord", "fly"),
+    "hda.sensing.lidar": ("Lidar",),
+    "hda.task.observation": ("Observation", "ScenarioView"),
+    "hda.flight.outcome": ("Ending", "Outcome"),
     "hda.policy": ("Decision", "DecisionStatus", "Policy", "PrivilegedPolicy", "ZemZevCommand"),
-    "hda.presets": ("PRESETS", "place_preset", "sample_scenario"),
+    "hda.task.presets": ("PRESETS", "place_preset", "sample_scenario"),
     "hda.registry": ("PolicyEntry", "make_policy", "policy_names", "register_policy"),
-    "hda.safety_map": ("SafetyCriteria", "SafetyMap", "assess_safety"),
-    "hda.scenario": ("Preset", "Rules", "Scenario", "StartConditions"),
-    "hda.terrain": ("TerrainParameters", "generate_terrain"),
-    "hda.tile": ("Tile", "make_tile"),
+    "hda.safety.safety_map": ("SafetyCriteria", "SafetyMap", "assess_safety"),
+    "hda.task.scenario": ("Preset", "Rules", "Scenario", "StartConditions"),
+    "hda.terrain.generator": ("TerrainParameters", "generate_terrain"),
+    "hda.ground.tile": ("Tile", "make_tile"),
 }
 
 __all__ = [

@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from guidance.console import tolerate_encoding
-from hda.belief import LEVEL_SHARES, LEVELS
-from hda.dtm_library import Ground, load_tile
-from hda.presets import PRESETS
-from hda.surroundings import DISTANCE_EDGES, safe_share_table, squared_distance
+from hda.policies.belief import LEVEL_SHARES, LEVELS
+from hda.ground.library import Ground, load_tile
+from hda.task.presets import PRESETS
+from hda.policies.surroundings import DISTANCE_EDGES, safe_share_table, squared_distance
 
 TILES = range(40)
 LOOKS_PER_TILE = 6

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from guidance.tracking.reference import TrackingReference
 from guidance.validation import finite_number, finite_vector
-from hda.observation import Observation, ScenarioView
+from hda.task.observation import Observation, ScenarioView
 
 if TYPE_CHECKING:
-    from hda.tile import Tile
+    from hda.ground.tile import Tile
 
 Memory = TypeVar("Memory")
 

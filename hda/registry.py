@@ -17,7 +17,7 @@ from importlib import metadata
 from typing import Any
 
 from hda.policy import Policy, PrivilegedPolicy
-from hda.presets import unknown_name
+from hda.task.presets import unknown_name
 
 AnyPolicy = Policy[Any] | PrivilegedPolicy
 

@@ -9,8 +9,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from hda.observation import Observation, ScenarioView
-from hda.tile import Tile
+from hda.task.observation import Observation, ScenarioView
+from hda.ground.tile import Tile
 
 Site = NDArray[np.float64]
 

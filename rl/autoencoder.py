@@ -17,9 +17,9 @@ import torch
 from numpy.typing import NDArray
 from torch import nn
 
-from hda.episode import advance, begin_flight, observe
-from hda.presets import sample_scenario
-from hda.scenario import Preset
+from hda.flight.episode import advance, begin_flight, observe
+from hda.task.presets import sample_scenario
+from hda.task.scenario import Preset
 from rl.action import decide_action
 from rl.artefacts import Tensors
 from rl.encoding import LATENT_SIZE

@@ -19,7 +19,7 @@ from hda.worker_pool import map_in_processes
 from rl.artefacts import Tensors
 
 if TYPE_CHECKING:
-    from hda.scenario import Preset
+    from hda.task.scenario import Preset
     from rl.algorithms import AgentSettings
     from rl.scoring import Score
 
@@ -113,7 +113,7 @@ def best_of_run(run: Path, choice: Choice, workers: int) -> Candidate:
     Raises:
         ValueError: the folder holds no run, or the run has no validated actor.
     """
-    from hda.presets import find_preset
+    from hda.task.presets import find_preset
     from rl.algorithms import settings_from_json
     from rl.artefacts import load_artefact
     from rl.run_folder import read_rows, read_run

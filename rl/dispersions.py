@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields, replace
 
 from guidance.validation import finite_number
-from hda.scenario import Preset, Range
+from hda.task.scenario import Preset, Range
 
 _START_RANGES = ("altitude", "distance", "descent_speed", "horizontal_speed", "mass", "target_area")
 

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from hda.observation import Observation
+from hda.task.observation import Observation
 
 ENCODING_VERSION = 1
 LATENT_SIZE = 32

@@ -11,11 +11,11 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from hda.episode import Flight, Step, advance, begin_flight, observe
-from hda.observation import Observation
-from hda.outcome import Outcome
-from hda.presets import find_preset
-from hda.scenario import Preset, Scenario
+from hda.flight.episode import Flight, Step, advance, begin_flight, observe
+from hda.task.observation import Observation
+from hda.flight.outcome import Outcome
+from hda.task.presets import find_preset
+from hda.task.scenario import Preset, Scenario
 from rl.action import PAPER_ACTIONS, ActionRanges, decide_action
 from rl.dispersions import Dispersions
 from rl.encoding import (
@@ -48,7 +48,7 @@ class LandingEnv(gymnasium.Env[ObsType, NDArray[np.float32]], Generic[ObsType]):
     | 3 | alpha_x: the target moves east by alpha_x times the look's width | -0.25 | 0.25 |
     | 4 | alpha_y: the target moves north by alpha_y times the look's width | -0.25 | 0.25 |
 
-    **Reward**: `hda.outcome.score_step`; the paper's terms with the signs it means.
+    **Reward**: `hda.flight.outcome.score_step`; the paper's terms with the signs it means.
 
     **Episode**: `terminated` at touchdown (or crash, or empty tank), `truncated` after `max_decisions` in
     flight. `reset(seed=s)` flies episode 0 of the study s, each later `reset()` the next one: the same

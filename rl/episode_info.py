@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from hda.episode import Flight, Step, ground_point
-from hda.outcome import Ending, RewardTerms
-from hda.scenario import Scenario
+from hda.flight.episode import Flight, Step, ground_point
+from hda.flight.outcome import Ending, RewardTerms
+from hda.task.scenario import Scenario
 
 ENDING_CODES = {ending: code for code, ending in enumerate(Ending, start=1)}
 """The number that stands for each ending in `info`; 0 is in flight."""

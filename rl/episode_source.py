@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-from hda.dtm_library import Ground, tile_numbers
-from hda.presets import find_preset, sample_scenario
-from hda.scenario import Preset, Scenario
+from hda.ground.library import Ground, tile_numbers
+from hda.task.presets import find_preset, sample_scenario
+from hda.task.scenario import Preset, Scenario
 from rl.dispersions import Dispersions
 
 

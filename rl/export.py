@@ -13,7 +13,7 @@ from rl.artefacts import WEIGHTS_FOLDER
 from rl.candidates import CHOICE_SEED, Candidate, Choice, best_of_run
 
 if TYPE_CHECKING:
-    from hda.scenario import Preset
+    from hda.task.scenario import Preset
     from rl.algorithms import AgentSettings
 
 
@@ -78,8 +78,8 @@ def run_export(options: ExportWeights) -> None:
     from rich.console import Console
 
     from guidance.validation import finite_number
-    from hda.dtm_library import Ground, prepare_tiles
-    from hda.presets import find_preset
+    from hda.ground.library import Ground, prepare_tiles
+    from hda.task.presets import find_preset
     from rl.actor_export import actor_card
     from rl.algorithms import settings_from_json
     from rl.artefacts import library_versions, save_artefact

@@ -22,7 +22,7 @@ from guidance.console import tolerate_encoding
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from hda.episode import EpisodeRecord
+    from hda.flight.episode import EpisodeRecord
 
 _OUT = Path("results/figures")
 
@@ -149,7 +149,7 @@ def draw_training(options: TrainingFigure) -> Figure:
 
 def draw_reconstruction(options: ReconstructionFigure) -> Figure:
     """Original looks above, reconstructions below, from the validation tiles."""
-    from hda.presets import find_preset
+    from hda.task.presets import find_preset
     from rl.autoencoder import autoencoder_from_tensors, collect_maps, reconstruct
     from rl.latent import load_autoencoder
 
@@ -242,8 +242,8 @@ def _draw_flight(panels: Any, record: EpisodeRecord, name: str) -> None:
 
 def _fly(name: str, preset: str, study_seed: int, episode: int) -> EpisodeRecord:
     import rl  # noqa: F401 - registers the agents
-    from hda.episode import fly
-    from hda.presets import sample_scenario
+    from hda.flight.episode import fly
+    from hda.task.presets import sample_scenario
     from hda.registry import make_policy
 
     return fly(make_policy(name), sample_scenario(preset, study_seed, episode, "validation"))

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from hda.observation import Observation, ScenarioView
-from hda.outcome import score_step
+from hda.task.observation import Observation, ScenarioView
+from hda.flight.outcome import score_step
 from hda.policy import Decision
 from rl.action import PAPER_ACTIONS, ActionRanges, decide_action
 from rl.artefacts import Artefact, ArtefactError, load_artefact

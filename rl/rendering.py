@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from hda.episode import Step
-from hda.observation import Observation
-from hda.scenario import Scenario
+from hda.flight.episode import Step
+from hda.task.observation import Observation
+from hda.task.scenario import Scenario
 
 _SIZE = (10.0, 5.0)
 _DPI = 64

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from hda.episode import fly
+from hda.flight.episode import fly
 from hda.policy import Policy
-from hda.presets import sample_scenario
-from hda.scenario import Preset
+from hda.task.presets import sample_scenario
+from hda.task.scenario import Preset
 
 
 @dataclass(frozen=True)

@@ -91,8 +91,8 @@ def run_agent_training(options: TrainAgent, name: str) -> None:
         ValueError: an option is out of range, or the folder holds another run.
     """
     from guidance.validation import finite_number
-    from hda.dtm_library import Ground, prepare_tiles
-    from hda.presets import find_preset
+    from hda.ground.library import Ground, prepare_tiles
+    from hda.task.presets import find_preset
     from rl.run_folder import TrainingPlan
     from rl.training import run_training
 

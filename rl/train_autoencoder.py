@@ -44,8 +44,8 @@ def run_autoencoder_training(options: TrainAutoencoder) -> None:
     from rich.console import Console
     from rich.progress import Progress
 
-    from hda.dtm_library import Ground, prepare_tiles
-    from hda.presets import find_preset
+    from hda.ground.library import Ground, prepare_tiles
+    from hda.task.presets import find_preset
     from rl import autoencoder
     from rl.artefacts import library_versions, save_artefact
     from rl.encoding import LATENT_SIZE

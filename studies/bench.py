@@ -14,11 +14,11 @@ from guidance import solve_pdg
 from guidance.console import tolerate_encoding
 from guidance.descent.residuals import fly_residuals
 from guidance.validation import finite_number
-from hda.episode import advance, begin_flight, observe
+from hda.flight.episode import advance, begin_flight, observe
 from hda.policy import PrivilegedPolicy
-from hda.presets import sample_scenario
+from hda.task.presets import sample_scenario
 from hda.registry import make_policy
-from hda.terrain_timing import measure_terrain
+from studies.terrain_timing import measure_terrain
 from studies.command_line import one_line_errors
 
 

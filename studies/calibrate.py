@@ -22,10 +22,10 @@ import tyro
 
 from guidance.console import tolerate_encoding
 from guidance.validation import finite_number
-from hda.dtm_library import Ground, remove_tiles
-from hda.presets import PRESETS, find_preset, sample_scenario
-from hda.scenario import Preset
-from hda.terrain import TerrainParameters
+from hda.ground.library import Ground, remove_tiles
+from hda.task.presets import PRESETS, find_preset, sample_scenario
+from hda.task.scenario import Preset
+from hda.terrain.generator import TerrainParameters
 from studies.command_line import one_line_errors
 from studies.executor import local_processes
 from studies.ground_statistics import GroundStatistics, measure_ground

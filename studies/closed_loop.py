@@ -22,12 +22,12 @@ from rich.table import Table
 from guidance.console import tolerate_encoding
 from guidance.tracking.soft_landing import DEFAULT_OPTIONS, SoftLandingOptions
 from guidance.validation import finite_number
-from hda.episode import fly
+from hda.flight.episode import fly
 from hda.policies.composition import ComposedPolicy, GuidanceLaw
 from hda.policies.planned_descent import PlannedDescent
 from hda.policies.zem_zev import FixedGainZemZev
-from hda.presets import find_preset, sample_scenario
-from hda.scenario import Preset
+from hda.task.presets import find_preset, sample_scenario
+from hda.task.scenario import Preset
 from hda.site_selection import NearestSafeSite, SingleDivertSite, SiteSelection
 from studies.command_line import one_line_errors
 from studies.executor import local_processes

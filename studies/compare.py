@@ -18,10 +18,10 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from guidance.console import tolerate_encoding
 from guidance.validation import finite_number
-from hda.own_terrain import OWN_SPLIT
-from hda.presets import find_preset, place_preset
+from hda.ground.own_terrain import OWN_SPLIT
+from hda.task.presets import find_preset, place_preset
 from hda.registry import policy_entry
-from hda.scenario import Preset
+from hda.task.scenario import Preset
 from studies.command_line import choose_policies, open_folder, resumable
 from studies.contract import check_contract
 from studies.executor import OpenExecutor, local_processes

@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from hda.episode import advance, begin_flight, fly, observe
-from hda.observation import Observation
+from hda.flight.episode import advance, begin_flight, fly, observe
+from hda.task.observation import Observation
 from hda.policy import Decision, Policy, PrivilegedPolicy
-from hda.presets import sample_scenario
+from hda.task.presets import sample_scenario
 from hda.registry import AnyPolicy
-from hda.scenario import Preset, Scenario
+from hda.task.scenario import Preset, Scenario
 from studies.rows import summarize_episode
 
 _CHECK_SEED = 4_000_000_000  # no study is flown at it

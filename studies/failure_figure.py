@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hda.episode import EpisodeRecord, ground_point
-from hda.observation import Observation
+from hda.flight.episode import EpisodeRecord, ground_point
+from hda.task.observation import Observation
 from studies.figures import COLORS, draw_ground_track
 
 if TYPE_CHECKING:

@@ -20,9 +20,9 @@ from rich.progress import track
 
 from guidance.console import tolerate_encoding
 from guidance.validation import finite_number
-from hda.episode import fly
-from hda.presets import PRESETS, sample_scenario, unknown_name
-from hda.scenario import Preset
+from hda.flight.episode import fly
+from hda.task.presets import PRESETS, sample_scenario, unknown_name
+from hda.task.scenario import Preset
 from studies.command_line import one_line_errors, open_folder
 from studies.failure_causes import Cause, Failure, explain_failure, find_remedies
 from studies.flights import ENDINGS

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hda.episode import EpisodeRecord, fly
-from hda.presets import sample_scenario
+from hda.flight.episode import EpisodeRecord, fly
+from hda.task.presets import sample_scenario
 from studies.histograms import MeasureHistograms
 from studies.monte_carlo import Study
 from studies.scores import StudyScores

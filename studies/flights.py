@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hda.episode import EpisodeRecord, fly
+from hda.flight.episode import EpisodeRecord, fly
 from hda.policy import ZemZevCommand
-from hda.presets import sample_scenario
-from hda.tile import Tile
+from hda.task.presets import sample_scenario
+from hda.ground.tile import Tile
 from studies.figures import save_flight
 from studies.monte_carlo import Study
 from studies.scores import StudyScores

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hda.scenario import Scenario
+from hda.task.scenario import Scenario
 from hda.site_selection import safe_clearance
 
 SPECK_RADIUS = 2.0

@@ -60,8 +60,8 @@ def score_run(folder: Path, episodes: int, choice: Choice, workers: int) -> Agen
     Raises:
         ValueError: the folder holds no run, or none of its actors was validated.
     """
-    from hda.dtm_library import Ground, prepare_tiles
-    from hda.presets import find_preset
+    from hda.ground.library import Ground, prepare_tiles
+    from hda.task.presets import find_preset
     from rl.actor_export import policy_of
     from rl.algorithms import settings_from_json
     from rl.scoring import score_policy

@@ -17,11 +17,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from hda.dtm_library import Ground, prepare_tiles
-from hda.episode import fly
-from hda.presets import sample_scenario
+from hda.ground.library import Ground, prepare_tiles
+from hda.flight.episode import fly
+from hda.task.presets import sample_scenario
 from hda.registry import AnyPolicy, make_policy, policy_entry
-from hda.scenario import Preset
+from hda.task.scenario import Preset
 from studies.executor import ClusterExecutor, OpenExecutor, WorkerDiedError, advise_script
 from studies.rows import EpisodeRow, summarize_episode
 

@@ -14,8 +14,8 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from hda.dtm_library import FORMAT_VERSION, Ground
-from hda.own_terrain import OwnTerrain
+from hda.ground.library import FORMAT_VERSION, Ground
+from hda.ground.own_terrain import OwnTerrain
 from studies.monte_carlo import Study, chunk_episodes
 
 _PACKAGES = (

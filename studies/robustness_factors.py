@@ -6,10 +6,10 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from hda.islands import IslandField
-from hda.presets import unknown_name
-from hda.scenario import Preset, Range
-from hda.terrain import TerrainParameters
+from hda.terrain.islands import IslandField
+from hda.task.presets import unknown_name
+from hda.task.scenario import Preset, Range
+from hda.terrain.generator import TerrainParameters
 
 
 @dataclass(frozen=True)

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from guidance.validation import finite_number
-from hda.dtm_library import Ground, prepare_tiles
-from hda.episode import fly
-from hda.presets import find_preset, sample_scenario
+from hda.ground.library import Ground, prepare_tiles
+from hda.flight.episode import fly
+from hda.task.presets import find_preset, sample_scenario
 from hda.registry import AnyPolicy, PolicyEntry, describe_policy, policy_entry
-from hda.scenario import Preset
+from hda.task.scenario import Preset
 from studies.statistics import Interval, least_passing, wilson_interval
 
 _MEASURES = ("safe_site", "success")

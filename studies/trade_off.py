@@ -20,10 +20,10 @@ from rich.progress import track
 
 from guidance.console import tolerate_encoding
 from guidance.validation import finite_number
-from hda.policies.hindsight import could_have_landed, least_propellant
-from hda.presets import find_preset, sample_scenario, unknown_name
+from hda.policies.privileged.knowable_ground import could_have_landed, least_propellant
+from hda.task.presets import find_preset, sample_scenario, unknown_name
 from hda.registry import policy_entry
-from hda.scenario import Preset
+from hda.task.scenario import Preset
 from studies.command_line import choose_policies, open_folder, resumable
 from studies.monte_carlo import Study
 from studies.point_score import score_rows

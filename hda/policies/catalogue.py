@@ -7,8 +7,8 @@ from hda.policies.adjusted_descent import AdjustedDescent
 from hda.policies.composition import ComposedPolicy, PrivilegedComposition
 from hda.policies.deferred_decision import DeferredDecisionPolicy
 from hda.policies.hazard_aware import HazardAwareSite
-from hda.policies.hindsight import BestKnownSite
-from hda.policies.oracle_fuel import CheapestSafeSite
+from hda.policies.privileged.knowable_ground import BestKnownSite
+from hda.policies.privileged.oracle_fuel import CheapestSafeSite
 from hda.policies.planned_descent import PlannedDescent
 from hda.policies.zem_zev import FixedGainZemZev
 from hda.registry import PolicyEntry

@@ -9,10 +9,10 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from hda.observation import Observation, ScenarioView
+from hda.task.observation import Observation, ScenarioView
 from hda.policy import Command, Decision, DecisionStatus, Policy
 from hda.site_selection import SiteSelection
-from hda.tile import Tile
+from hda.ground.tile import Tile
 
 
 class GuidanceLaw(Protocol):

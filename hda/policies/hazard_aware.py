@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from guidance.constants import MOON_GRAVITY
 from guidance.lander import Lander
 from guidance.state import State
-from hda.belief import SafetyBelief
-from hda.lidar import Lidar
-from hda.observation import Observation, ScenarioView
+from hda.policies.belief import SafetyBelief
+from hda.sensing.lidar import Lidar
+from hda.task.observation import Observation, ScenarioView
 from hda.policies.site_price import (
     LATTICE,
     HazardAwareWeights,
@@ -26,7 +26,7 @@ from hda.policies.site_price import (
     price_sites,
     propellant_map,
 )
-from hda.surroundings import infer_unseen
+from hda.policies.surroundings import infer_unseen
 
 Array = NDArray[np.float64]
 

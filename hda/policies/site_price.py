@@ -24,8 +24,8 @@ from numpy.typing import NDArray
 from guidance.kernel import compile_kernel
 from guidance.two_impulse import divert_cost
 from guidance.validation import finite_number
-from hda.belief import SafetyBelief
-from hda.observation import Observation, ScenarioView
+from hda.policies.belief import SafetyBelief
+from hda.task.observation import Observation, ScenarioView
 
 Array = NDArray[np.float64]
 

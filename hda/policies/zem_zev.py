@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from guidance.upright_time import upright_time_to_go
-from hda.observation import Observation, ScenarioView
+from hda.task.observation import Observation, ScenarioView
 from hda.policy import DecisionStatus, ZemZevCommand
 
 

@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 
 import hda
-from hda.episode import EpisodeRecord, Flight, Step, advance, begin_flight, fly, observe
-from hda.observation import Observation
+from hda.flight.episode import EpisodeRecord, Flight, Step, advance, begin_flight, fly, observe
+from hda.task.observation import Observation
 from hda.policy import Decision, DecisionStatus, PlanCommand, Policy, PrivilegedPolicy, ZemZevCommand
 from hda.registry import policy_entry
-from hda.scenario import Scenario
+from hda.task.scenario import Scenario
 from tests.equality import parts, same
 
 importlib.import_module("rl")  # adds the agents

@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from hda import dtm_library
+from hda.ground import library as dtm_library
 
 
 @pytest.fixture

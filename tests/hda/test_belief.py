@@ -8,12 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from guidance import State
-from hda.belief import LEVEL_SHARES, LEVELS, SafetyBelief
+from hda.policies.belief import LEVEL_SHARES, LEVELS, SafetyBelief
 from hda.belief_statistics import level_shares
-from hda.dtm_library import Ground, load_tile
-from hda.lidar import Lidar, look
-from hda.observation import Observation
-from hda.presets import PRESETS
+from hda.ground.library import Ground, load_tile
+from hda.sensing.lidar import Lidar, look
+from hda.task.observation import Observation
+from hda.task.presets import PRESETS
 from tests.oracles.map_belief import Look, Sensor, probability_safe, readings_of_cell
 
 PLANE = 50.0

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import poisson
 
-from hda.craters import (
+from hda.terrain.craters import (
     CraterPopulation,
     Craters,
     DepthLaw,

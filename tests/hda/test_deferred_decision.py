@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from hda.episode import begin_flight, fly, observe
+from hda.flight.episode import begin_flight, fly, observe
 from hda.policies.deferred_decision import Candidates, DeferredDecisionOptions, DeferredDecisionPolicy
-from hda.presets import sample_scenario
+from hda.task.presets import sample_scenario
 
 
 def test_chances_are_those_of_the_first_safe_candidate():

@@ -11,13 +11,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import hda.safety_map
-import hda.terrain
+import hda.safety.safety_map
+import hda.terrain.generator
 from guidance.kernel import cache_folder
-from hda import dtm_library
-from hda.base_surface import BaseSurface
-from hda.craters import CraterPopulation, DepthLaw
-from hda.dtm_library import (
+from hda.ground import library as dtm_library
+from hda.terrain.base_surface import BaseSurface
+from hda.terrain.craters import CraterPopulation, DepthLaw
+from hda.ground.library import (
     SPLITS,
     Ground,
     build_tile,
@@ -27,11 +27,11 @@ from hda.dtm_library import (
     remove_tiles,
     tile_numbers,
 )
-from hda.islands import IslandField
-from hda.rocks import RockPopulation
-from hda.safety_map import SafetyCriteria
-from hda.terrain import TerrainParameters
-from hda.tile import Tile
+from hda.terrain.islands import IslandField
+from hda.terrain.rocks import RockPopulation
+from hda.safety.safety_map import SafetyCriteria
+from hda.terrain.generator import TerrainParameters
+from hda.ground.tile import Tile
 
 SMALL_TERRAIN = TerrainParameters(
     size=100, craters=CraterPopulation(minimum_diameter=5.0, maximum_diameter=40.0)
@@ -137,7 +137,7 @@ def test_an_unknown_split_is_named():
 def test_a_tile_is_the_terrain_of_its_number():
     tile = load_tile(SMALL, 3, "train")
     assert_equal(tile, build_tile(SMALL, 3))
-    dem = hda.terrain.generate_terrain(SMALL_TERRAIN, np.random.default_rng(3))
+    dem = hda.terrain.generator.generate_terrain(SMALL_TERRAIN, np.random.default_rng(3))
     np.testing.assert_allclose(tile.elevation, dem, atol=1e-5)
     assert float(tile.elevation.max()) == 50.0
     assert not np.array_equal(tile.elevation, load_tile(SMALL, 4, "train").elevation)
@@ -379,15 +379,15 @@ def test_missing_tiles_are_built_in_parallel_and_equal(workers, capsys):
 
 RACER = """
 import os, sys, time
-import hda.safety_map, hda.terrain
-from hda import dtm_library
-from hda.craters import CraterPopulation
+import hda.safety.safety_map, hda.terrain.generator
+from hda.ground import library as dtm_library
+from hda.terrain.craters import CraterPopulation
 
 mine, other = sys.argv[1:]
-terrain = hda.terrain.TerrainParameters(
+terrain = hda.terrain.generator.TerrainParameters(
     size=100, craters=CraterPopulation(minimum_diameter=5.0, maximum_diameter=40.0)
 )
-ground = dtm_library.Ground(terrain, hda.safety_map.SafetyCriteria())
+ground = dtm_library.Ground(terrain, hda.safety.safety_map.SafetyCriteria())
 build = dtm_library.build_tile
 
 def build_together(ground, number):

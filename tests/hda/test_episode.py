@@ -10,11 +10,11 @@ import pytest
 
 import hda
 from guidance import State
-from hda.episode import EpisodeRecord, advance, begin_flight, elevation_angle, fly, observe
-from hda.lidar import look
-from hda.outcome import Ending
+from hda.flight.episode import EpisodeRecord, advance, begin_flight, elevation_angle, fly, observe
+from hda.sensing.lidar import look
+from hda.flight.outcome import Ending
 from hda.policy import Decision, Policy, ZemZevCommand
-from hda.scenario import Range, Rules, Scenario, StartConditions
+from hda.task.scenario import Range, Rules, Scenario, StartConditions
 from tests.equality import same
 
 POLICIES = ("no-divert", "single-divert", "nearest-safe", "oracle")

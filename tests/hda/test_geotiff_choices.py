@@ -10,8 +10,8 @@ from rasterio.crs import CRS
 from rasterio.enums import ColorInterp
 from rasterio.transform import Affine
 
-from hda.elevation_file import ElevationFileError, open_elevation
-from hda.own_terrain import cut_tile, open_own_terrain
+from hda.ground.elevation_file import ElevationFileError, open_elevation
+from hda.ground.own_terrain import cut_tile, open_own_terrain
 from tests.ground_files import MOON, write_geotiff
 
 pytestmark = pytest.mark.filterwarnings("ignore:Use `@` matmul:PendingDeprecationWarning")

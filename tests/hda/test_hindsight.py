@@ -12,17 +12,17 @@ from guidance import InfeasibleError, solve_pdg
 from guidance.dynamics import propagate
 from guidance.lander import PAPER_LANDER
 from guidance.state import State
-from hda.episode import begin_flight, fly, observe
-from hda.policies.hindsight import (
+from hda.flight.episode import begin_flight, fly, observe
+from hda.policies.privileged.knowable_ground import (
     KnowableGround,
     could_have_landed,
     first_ground,
     least_propellant,
     nearest_known_site,
 )
-from hda.presets import PRESETS, sample_scenario
+from hda.task.presets import PRESETS, sample_scenario
 from hda.registry import make_policy
-from hda.scenario import Preset, Range, Scenario
+from hda.task.scenario import Preset, Range, Scenario
 
 UNPRIVILEGED = ("no-divert", "single-divert", "nearest-safe", "nearest-safe+convex", "hazard-aware")
 FEW_METRES = replace(PRESETS["paper"].start, altitude=Range(250.0, 300.0), mass=Range(1174.0, 1174.0))

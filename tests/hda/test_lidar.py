@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import chi2
 
-from hda.lidar import Lidar, look
-from hda.random_streams import EpisodeStreams
+from hda.sensing.lidar import Lidar, look
+from hda.task.random_streams import EpisodeStreams
 from tests.oracles import algorithm_2
 
 SEEDS = st.integers(0, 2**32 - 1)

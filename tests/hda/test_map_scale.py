@@ -11,8 +11,8 @@ from rasterio.crs import CRS
 from rasterio.transform import Affine
 from rasterio.warp import Resampling, calculate_default_transform, reproject, transform
 
-from hda.elevation_file import ElevationFileError, open_elevation
-from hda.own_terrain import cut_tile, open_own_terrain
+from hda.ground.elevation_file import ElevationFileError, open_elevation
+from hda.ground.own_terrain import cut_tile, open_own_terrain
 from tests.ground_files import write_geotiff
 from tests.oracles.mapped_plane import SLOPE_DEG, Site, measured_slope, write_plane
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import hda
-from hda.episode import fly
-from hda.lidar import Lidar
-from hda.random_streams import EpisodeStreams
-from hda.scenario import Rules, Scenario
+from hda.flight.episode import fly
+from hda.sensing.lidar import Lidar
+from hda.task.random_streams import EpisodeStreams
+from hda.task.scenario import Rules, Scenario
 
 
 def with_errors(scenario: Scenario, position: float, velocity: float, dropout: float = 0.0) -> Scenario:

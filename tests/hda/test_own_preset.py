@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hda.dtm_library import Ground, check_split, tile_numbers
-from hda.own_terrain import OWN_SPLIT, OwnTerrain
-from hda.presets import PAPER_TERRAIN, place_preset, sample_scenario
-from hda.terrain import generate_terrain, terrain_rng
+from hda.ground.library import Ground, check_split, tile_numbers
+from hda.ground.own_terrain import OWN_SPLIT, OwnTerrain
+from hda.task.presets import PAPER_TERRAIN, place_preset, sample_scenario
+from hda.terrain.generator import generate_terrain, terrain_rng
 
 
 @pytest.fixture(scope="module")
@@ -60,7 +60,7 @@ def test_a_smaller_share_flies_over_all_of_them(
 
 def test_a_tile_that_is_flown_over_has_targets_for_every_episode(mixed: Path, cache: Path) -> None:
     """A share that one place in a thousand has: some episode would find none and stop the study."""
-    from hda.dtm_library import load_tile
+    from hda.ground.library import load_tile
 
     preset = place_preset("paper", mixed, hazard_share=0.0, workers=1)
     tile = load_tile(Ground(preset.terrain, preset.criteria), 2, OWN_SPLIT)

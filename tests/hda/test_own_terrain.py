@@ -12,14 +12,14 @@ from hypothesis import strategies as st
 from rasterio.crs import CRS
 from rasterio.transform import Affine
 
-from hda import dtm_library
-from hda.dtm_library import Ground, check_split, load_tile, prepare_tiles, tile_numbers
-from hda.elevation_file import ElevationFileError, open_elevation
-from hda.own_terrain import OWN_SPLIT, OwnTerrain, cut_tile, open_own_terrain
-from hda.presets import PAPER_TERRAIN, PRESETS, place_preset, sample_scenario
-from hda.resampling import axis_weights, resample
-from hda.safety_map import SafetyCriteria
-from hda.terrain import generate_terrain, terrain_rng
+from hda.ground import library as dtm_library
+from hda.ground.library import Ground, check_split, load_tile, prepare_tiles, tile_numbers
+from hda.ground.elevation_file import ElevationFileError, open_elevation
+from hda.ground.own_terrain import OWN_SPLIT, OwnTerrain, cut_tile, open_own_terrain
+from hda.task.presets import PAPER_TERRAIN, PRESETS, place_preset, sample_scenario
+from hda.ground.resampling import axis_weights, resample
+from hda.safety.safety_map import SafetyCriteria
+from hda.terrain.generator import generate_terrain, terrain_rng
 from tests.ground_files import MOON, write_geotiff
 
 # rasterio 1.4 multiplies affine 3 transforms the old way, inside itself.

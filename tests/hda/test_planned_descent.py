@@ -7,14 +7,14 @@ import pytest
 
 from guidance.state import State
 from guidance.zem_zev import time_to_go
-from hda.episode import begin_flight, fly, observe
-from hda.observation import Observation
+from hda.flight.episode import begin_flight, fly, observe
+from hda.task.observation import Observation
 from hda.policies.composition import ComposedPolicy
 from hda.policies.planned_descent import DescentMemory, PlannedDescent
 from hda.policies.zem_zev import FixedGainZemZev
 from hda.policy import DecisionStatus, PlanCommand, ZemZevCommand
-from hda.presets import find_preset, sample_scenario
-from hda.scenario import Scenario
+from hda.task.presets import find_preset, sample_scenario
+from hda.task.scenario import Scenario
 from hda.site_selection import OracleSite
 
 

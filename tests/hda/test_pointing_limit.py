@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 
 import hda
 from guidance import MOON_GRAVITY, Lander, State, time_to_go, zem_zev_acceleration
-from hda.episode import EpisodeRecord
+from hda.flight.episode import EpisodeRecord
 from hda.policy import Decision, DecisionStatus, PlanCommand, ZemZevCommand
-from hda.presets import PRESETS
-from hda.scenario import Preset
-from hda.vehicle import FlightErrors, Segment, fly_interval
+from hda.task.presets import PRESETS
+from hda.task.scenario import Preset
+from hda.flight.vehicle import FlightErrors, Segment, fly_interval
 from tests.equality import same
 
 importlib.import_module("rl")  # adds the agents

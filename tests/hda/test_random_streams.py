@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hda.random_streams import EpisodeStreams
+from hda.task.random_streams import EpisodeStreams
 
 SEEDS = st.integers(0, 2**32 - 1)
 EPISODES = st.integers(0, 100_000)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 from scipy.stats import poisson
 
-from hda.rocks import RockPopulation, Rocks, draw_rocks, rock_heights, rock_margin
+from hda.terrain.rocks import RockPopulation, Rocks, draw_rocks, rock_heights, rock_margin
 
 
 def make_rocks(*rows: tuple[float, float, float, float, float]) -> Rocks:

@@ -10,12 +10,12 @@ from hypothesis import strategies as st
 from scipy.stats import kstest
 
 import hda
-from hda.dtm_library import SPLITS
-from hda.presets import PRESETS
-from hda.random_streams import EpisodeStreams
-from hda.scenario import Preset, Range, Rules, StartConditions, draw_scenario, draw_state, draw_target
-from hda.terrain import TerrainParameters
-from hda.tile import Tile
+from hda.ground.library import SPLITS
+from hda.task.presets import PRESETS
+from hda.task.random_streams import EpisodeStreams
+from hda.task.scenario import Preset, Range, Rules, StartConditions, draw_scenario, draw_state, draw_target
+from hda.terrain.generator import TerrainParameters
+from hda.ground.tile import Tile
 from tests.equality import same
 
 PAPER = Preset("flat")

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from guidance import State
-from hda.observation import Observation
+from hda.task.observation import Observation
 from hda.site_selection import (
     NearestSafeSite,
     NominalSite,
@@ -21,7 +21,7 @@ from hda.site_selection import (
     safe_clearance,
     safest_site,
 )
-from hda.tile import Tile
+from hda.ground.tile import Tile
 
 TARGET = np.array([500.0, 400.0, 50.0])
 VIEW: Any = None  # no selection here reads the view

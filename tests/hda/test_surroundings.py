@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hda.belief_statistics import LOOK_WIDTHS
-from hda.dtm_library import Ground, load_tile
-from hda.presets import PRESETS
-from hda.surroundings import (
+from hda.ground.library import Ground, load_tile
+from hda.task.presets import PRESETS
+from hda.policies.surroundings import (
     DISTANCE_EDGES,
     LARGEST_DISTANCE,
     infer_unseen,

@@ -8,8 +8,8 @@ import pytest
 import rasterio
 from scipy.ndimage import gaussian_filter, zoom
 
-from hda.elevation_file import ElevationFileError
-from hda.own_terrain import cut_tile, open_own_terrain
+from hda.ground.elevation_file import ElevationFileError
+from hda.ground.own_terrain import cut_tile, open_own_terrain
 from tests.ground_files import write_geotiff
 
 pytestmark = pytest.mark.filterwarnings("ignore:Use `@` matmul:PendingDeprecationWarning")

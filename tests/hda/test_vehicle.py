@@ -16,9 +16,9 @@ from guidance import (
     time_to_go,
     zem_zev_acceleration,
 )
-from hda.held_thrust import hold_period
+from hda.flight.held_thrust import hold_period
 from hda.policy import Decision, ZemZevCommand
-from hda.vehicle import FlightErrors, FlightStatus, Segment, fly_interval
+from hda.flight.vehicle import FlightErrors, FlightStatus, Segment, fly_interval
 from tests.oracles import flown_interval
 
 GRAVITY = np.array(MOON_GRAVITY)

@@ -16,7 +16,7 @@ UNGUARDED = """
 import os
 from pathlib import Path
 from hda import Ground, SafetyCriteria, TerrainParameters, load_tile, prepare_tiles
-from hda.craters import CraterPopulation
+from hda.terrain.craters import CraterPopulation
 from hda.worker_pool import map_in_processes
 
 print("started")

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from guidance.state import State
-from hda.observation import Observation
+from hda.task.observation import Observation
 from hda.policy import ZemZevCommand
 from rl.action import ACTION_NAMES, ActionRanges, decide_action
 

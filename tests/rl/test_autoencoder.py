@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from hda.presets import PRESETS
+from hda.task.presets import PRESETS
 from rl.autoencoder import (
     Autoencoder,
     AutoencoderSettings,

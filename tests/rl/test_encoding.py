@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from guidance.state import State
-from hda.observation import Observation
+from hda.task.observation import Observation
 from rl.encoding import CURVED, LATENT_BOUND, LATENT_SIZE, LAYOUTS, PRINTED, RELATIVE, encode_observation
 
 LATENT = np.linspace(-1.0, 1.0, LATENT_SIZE, dtype=np.float32)

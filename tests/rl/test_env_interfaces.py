@@ -16,8 +16,8 @@ from gymnasium.wrappers import RecordEpisodeStatistics
 from stable_baselines3.common.monitor import Monitor
 
 import rl  # noqa: F401 - registers the environments
-from hda.outcome import Ending
-from hda.presets import PRESETS, sample_scenario
+from hda.flight.outcome import Ending
+from hda.task.presets import PRESETS, sample_scenario
 from rl.env import LunarHDAEnv, LunarHDAMapEnv
 from rl.episode_info import ENDING_CODES
 

@@ -8,11 +8,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from hda.episode import fly
+from hda.flight.episode import fly
 from hda.policies.composition import ComposedPolicy
 from hda.policies.zem_zev import FixedGainZemZev
 from hda.policy import Policy, ZemZevCommand
-from hda.presets import sample_scenario
+from hda.task.presets import sample_scenario
 from hda.registry import make_policy
 from rl.actor_export import actor_card
 from rl.algorithms import RECIPES

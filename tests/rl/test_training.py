@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hda.presets import PRESETS
+from hda.task.presets import PRESETS
 from rl.algorithms import RECIPES
 from rl.artefacts import ArtefactError, load_artefact
 from rl.run_folder import TrainingPlan, read_rows

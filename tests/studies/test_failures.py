@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hda.episode import EpisodeRecord, fly
-from hda.presets import PRESETS, sample_scenario
+from hda.flight.episode import EpisodeRecord, fly
+from hda.task.presets import PRESETS, sample_scenario
 from hda.registry import make_policy
-from hda.scenario import Preset, Range
+from hda.task.scenario import Preset, Range
 from studies.compare import Comparison, compare
 from studies.failure_causes import (
     Cause,

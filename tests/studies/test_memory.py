@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from scipy.stats import ttest_ind
 
-from hda.presets import PRESETS
+from hda.task.presets import PRESETS
 from rl.algorithms import RECIPES
 from rl.artefacts import WEIGHTS_FOLDER
 from rl.candidates import Choice

@@ -14,7 +14,7 @@ import pytest
 
 import hda
 from hda import registry
-from hda.presets import PRESETS
+from hda.task.presets import PRESETS
 from hda.registry import policy_entry
 from studies.compare import Comparison, compare, plan_study
 from studies.contract import ContractError, check_contract

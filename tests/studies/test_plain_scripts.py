@@ -28,8 +28,8 @@ def test_a_ratio_can_be_asserted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     monkeypatch.setenv("LUNAR_HDA_CACHE", str(tmp_path / "cache"))  # its tiles are missing
     done = run_script(
         "from studies.testing import assert_safe_ratio\n"
-        "import hda.dtm_library\n"
-        "hda.dtm_library.SPLITS['validation'] = range(1000, 1002)\n"
+        "import hda.ground.library\n"
+        "hda.ground.library.SPLITS['validation'] = range(1000, 1002)\n"
         "print(assert_safe_ratio('single-divert', episodes=10, at_least=0.5).estimate)\n",
         tmp_path,
     )

@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from hda.presets import PRESETS
+from hda.task.presets import PRESETS
 from studies import monte_carlo
 from studies.compare import Comparison, compare
 from studies.executor import WorkerDiedError

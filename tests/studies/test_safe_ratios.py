@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from hda.presets import PRESETS
+from hda.task.presets import PRESETS
 from hda.registry import policy_entry, policy_names
 from studies.monte_carlo import Study, fly_chunk
 from studies.statistics import least_passing

@@ -11,8 +11,8 @@ from scipy.integrate import solve_ivp
 
 from guidance import MOON_GRAVITY, Lander, State, zem_zev_acceleration
 from hda.policy import Decision, DecisionStatus, ZemZevCommand
-from hda.presets import PRESETS
-from hda.vehicle import FlightErrors, FlightStatus, fly_interval
+from hda.task.presets import PRESETS
+from hda.flight.vehicle import FlightErrors, FlightStatus, fly_interval
 from studies.stability import Stability, study_stability
 from studies.stability_sweep import gain_box, mean_descent
 from studies.zem_zev_flight import (
@@ -184,7 +184,7 @@ def test_clock_reaches_cut_off_as_the_vehicle_does(gains: Gains, time: float) ->
 
 @given(BOX, st.floats(3.0, 30.0))
 def test_sampled_flight_against_the_vehicle(gains: Gains, time: float) -> None:
-    """`hda.vehicle` with no thrust limit and hardly any mass change flies the sampled loop."""
+    """`hda.flight.vehicle` with no thrust limit and hardly any mass change flies the sampled loop."""
     if abs((time / PERIOD) % 1.0 - 0.5) < 1e-6:
         return
     lander = Lander(dry_mass=1.0, max_thrust=1e12, specific_impulse=1e15)

@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 
 import hda
 from hda import registry
-from hda.episode import fly
+from hda.flight.episode import fly
 from hda.policies.hazard_aware import HazardAwareSite
 from hda.policies.site_price import HazardAwareWeights
-from hda.presets import sample_scenario
+from hda.task.presets import sample_scenario
 from hda.registry import make_policy
 from studies.point_score import PointScore
 from studies.statistics import Interval

@@ -6,8 +6,8 @@ from functools import cache
 import numpy as np
 from scipy.ndimage import gaussian_filter, map_coordinates, zoom
 
-from hda.presets import PRESETS
-from hda.terrain import TerrainParameters, generate_terrain, terrain_rng
+from hda.task.presets import PRESETS
+from hda.terrain.generator import TerrainParameters, generate_terrain, terrain_rng
 
 SIDES = (1.0, 2.0, 5.0, 10.0)
 FILLS = (0.0, -9999.0, -32767.0, -32768.0, -3.4028234663852886e38, 65535.0, 1e20, 255.0, 32767.0, -1e30)

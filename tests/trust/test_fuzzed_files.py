@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hda.surroundings import safe_share_table
+from hda.policies.surroundings import safe_share_table
 from rl.artefacts import ArtefactError, card_digest, load_artefact, save_artefact
 from rl.policy import load_actor
 from rl.run_folder import read_rows, read_run
@@ -168,7 +168,7 @@ def flown(study: Study, first: int, last: int) -> Chunk:
 def test_a_damaged_folder_is_refused_or_gives_what_was_flown(
     tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
 ) -> None:
-    from hda.presets import PRESETS
+    from hda.task.presets import PRESETS
 
     study = Study(PRESETS["paper"], ("no-divert", "oracle"), 25, 4)
     path = tmp_path_factory.mktemp("study") / "study"
@@ -200,7 +200,7 @@ def test_a_damaged_folder_is_refused_or_gives_what_was_flown(
 def test_a_folder_with_a_foreign_record_is_refused(
     tmp_path_factory: pytest.TempPathFactory, content: bytes
 ) -> None:
-    from hda.presets import PRESETS
+    from hda.task.presets import PRESETS
 
     path = tmp_path_factory.mktemp("study")
     (path / "shards").mkdir()

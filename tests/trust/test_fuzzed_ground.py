@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from hda.elevation_file import ElevationFileError, open_elevation
-from hda.own_terrain import open_own_terrain
-from hda.safety_map import SafetyCriteria, assess_safety
-from hda.tile import make_tile
+from hda.ground.elevation_file import ElevationFileError, open_elevation
+from hda.ground.own_terrain import open_own_terrain
+from hda.safety.safety_map import SafetyCriteria, assess_safety
+from hda.ground.tile import make_tile
 
 HEIGHTS = st.one_of(
     st.floats(-5.0, 5.0),

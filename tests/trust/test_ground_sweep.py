@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hda.own_terrain import OwnTerrain, cut_tile, open_own_terrain
+from hda.ground.own_terrain import OwnTerrain, cut_tile, open_own_terrain
 from tests.oracles.mapped_plane import SLOPE_DEG, draw_site, measured_slope, write_plane
 from tests.trust.made_ground import draw_ground, put_void
 

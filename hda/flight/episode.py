@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 
 from guidance.state import State
 from guidance.upright_time import upright_time_to_go
-from hda.lidar import look
-from hda.observation import Observation
-from hda.outcome import Outcome, RewardTerms, classify, score_step
+from hda.sensing.lidar import look
+from hda.task.observation import Observation
+from hda.flight.outcome import Outcome, RewardTerms, classify, score_step
 from hda.policy import Decision, Policy, PrivilegedPolicy
-from hda.scenario import Scenario
-from hda.vehicle import FlightErrors, FlightStatus, Segment, fly_interval
+from hda.task.scenario import Scenario
+from hda.flight.vehicle import FlightErrors, FlightStatus, Segment, fly_interval
 
 
 @dataclass(frozen=True, eq=False)

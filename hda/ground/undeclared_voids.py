@@ -1,7 +1,7 @@
 """Values of an elevation model that only look like ground, refused with what to do about them.
 
 A void that its file does not declare is one exact number over an area: a warp's zeros, -9999, the end of a
-type. As ground it would be perfectly flat and safe. It is known by what it looks like (`hda.flat_areas`):
+type. As ground it would be perfectly flat and safe. It is known by what it looks like (`hda.ground.flat_areas`):
 most of its outline is a cliff. On ground of whole metres or of repeated pixels equal neighbours are common,
 so that an area must be larger there and its outline clearer.
 """
@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hda.elevation_source import ElevationFile, ElevationFileError
-from hda.flat_areas import FlatAreas
-from hda.ground_survey import LEAST_AREA, TileSurvey, high_step
+from hda.ground.elevation_source import ElevationFile, ElevationFileError
+from hda.ground.flat_areas import FlatAreas
+from hda.ground.survey import LEAST_AREA, TileSurvey, high_step
 
 LEAST_RELIEF = 0.05
 """[m] Less over a whole tile is no measured ground."""

@@ -12,16 +12,16 @@ from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
-from hda.dtm_library import Ground, load_tile, tile_numbers
-from hda.elevation_file import NoData
-from hda.islands import IslandField
-from hda.lidar import Lidar
-from hda.own_preset import place_on_terrain
-from hda.own_terrain import open_own_terrain
-from hda.random_streams import EpisodeStreams
-from hda.rocks import RockPopulation
-from hda.scenario import Preset, Rules, Scenario, draw_scenario
-from hda.terrain import TerrainParameters
+from hda.ground.library import Ground, load_tile, tile_numbers
+from hda.ground.elevation_file import NoData
+from hda.terrain.islands import IslandField
+from hda.sensing.lidar import Lidar
+from hda.task.own_ground import place_on_terrain
+from hda.ground.own_terrain import open_own_terrain
+from hda.task.random_streams import EpisodeStreams
+from hda.terrain.rocks import RockPopulation
+from hda.task.scenario import Preset, Rules, Scenario, draw_scenario
+from hda.terrain.generator import TerrainParameters
 
 BLOCKY_ROCKS = RockPopulation(area_fraction=0.3, decay_constant=0.6, decay_slope=0.0)
 """Dense large blocks, of which almost no pin-hole of safe ground is left between the islands. The Mars fit's
@@ -86,7 +86,7 @@ def place_preset(
 
     Args:
         preset: name of a preset, or a Preset.
-        file: GeoTIFF or .npy, see `hda.own_terrain.open_own_terrain`.
+        file: GeoTIFF or .npy, see `hda.ground.own_terrain.open_own_terrain`.
         pixel_size: [m] of an .npy file; 1 if left out.
         band: of a GeoTIFF, counted from 1; needed where there are several.
         nodata: numbers in the file that mean unknown ground, one or several, besides that which it declares.

@@ -12,10 +12,10 @@ import tyro
 from numpy.typing import NDArray
 from rich.console import Console
 
-from hda.base_surface import rms_slope
-from hda.presets import PAPER_TERRAIN
-from hda.safety_map import DEFAULT_CRITERIA, SafetyCriteria, SafetyMap, assess_safety
-from hda.terrain import TerrainParameters, generate_terrain, terrain_rng
+from hda.terrain.base_surface import rms_slope
+from hda.task.presets import PAPER_TERRAIN
+from hda.safety.safety_map import DEFAULT_CRITERIA, SafetyCriteria, SafetyMap, assess_safety
+from hda.terrain.generator import TerrainParameters, generate_terrain, terrain_rng
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

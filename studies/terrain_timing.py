@@ -1,4 +1,4 @@
-"""How long a tile and its safety map take: `python -m hda.terrain_timing`."""
+"""How long a tile and its safety map take: `python -m studies.terrain_timing`."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import numba
 import numpy as np
 
 from guidance.validation import finite_number
-from hda.safety_map import assess_safety
-from hda.terrain import TerrainParameters, generate_terrain, terrain_rng
+from hda.safety.safety_map import assess_safety
+from hda.terrain.generator import TerrainParameters, generate_terrain, terrain_rng
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from guidance.lander import Lander
 from guidance.state import State
-from hda.lidar import Lidar
+from hda.sensing.lidar import Lidar
 
 
 @dataclass(frozen=True, eq=False)

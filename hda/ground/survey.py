@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hda.elevation_source import HIGHEST, ElevationFile
-from hda.flat_areas import REACH, FlatAreas, find_flat_areas
+from hda.ground.elevation_source import HIGHEST, ElevationFile
+from hda.ground.flat_areas import REACH, FlatAreas, find_flat_areas
 
 LEAST_AREA = 4
 """[pixels] Smaller areas of one height are chance."""

@@ -29,9 +29,9 @@ from numpy.typing import NDArray
 
 from guidance.kernel import compile_kernel
 from guidance.state import State
-from hda.observation import Observation, ScenarioView
-from hda.policies.oracle_fuel import CheapestSafeSite
-from hda.scenario import Rules, Scenario
+from hda.task.observation import Observation, ScenarioView
+from hda.policies.privileged.oracle_fuel import CheapestSafeSite
+from hda.task.scenario import Rules, Scenario
 from hda.site_selection import Site
 
 Array = NDArray[np.float64]

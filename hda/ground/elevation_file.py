@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from guidance.validation import finite_number
-from hda.elevation_source import ElevationFile, ElevationFileError, known_heights
-from hda.geotiff import open_geotiff
+from hda.ground.elevation_source import ElevationFile, ElevationFileError, known_heights
+from hda.ground.geotiff import open_geotiff
 
 __all__ = [
     "GEOTIFF_SUFFIXES",

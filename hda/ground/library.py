@@ -3,7 +3,7 @@
 A tile's number is its seed. The splits never mix: training ground, ground to tune on, ground to evaluate on,
 and fresh ground for reliability runs. Every parameter of the terrain and of its assessment, and the format
 version, go into the cache key, so a change of any of them builds anew. A terrain of a user's own
-(`hda.own_terrain`) is kept here too, under the hash of its file; its split is `own`.
+(`hda.ground.own_terrain`) is kept here too, under the hash of its file; its split is `own`.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ import numpy as np
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from guidance.kernel import cache_folder
-from hda.own_terrain import OWN_SPLIT, OwnTerrain, cut_tile
-from hda.safety_map import SafetyCriteria
-from hda.terrain import TerrainParameters, generate_terrain
-from hda.tile import Tile, make_tile
+from hda.ground.own_terrain import OWN_SPLIT, OwnTerrain, cut_tile
+from hda.safety.safety_map import SafetyCriteria
+from hda.terrain.generator import TerrainParameters, generate_terrain
+from hda.ground.tile import Tile, make_tile
 from hda.worker_pool import map_in_processes
 
 FORMAT_VERSION = 1

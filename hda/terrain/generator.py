@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from guidance.validation import finite_number
-from hda.base_surface import BaseSurface, generate_base_surface
-from hda.craters import CraterPopulation, crater_relief, draw_craters
-from hda.islands import IslandField, generate_island_field
-from hda.rocks import RockPopulation, draw_rocks, rock_heights, rock_margin
+from hda.terrain.base_surface import BaseSurface, generate_base_surface
+from hda.terrain.craters import CraterPopulation, crater_relief, draw_craters
+from hda.terrain.islands import IslandField, generate_island_field
+from hda.terrain.rocks import RockPopulation, draw_rocks, rock_heights, rock_margin
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,7 @@ if __name__ == "__main__":
     import tyro
 
     from guidance.console import tolerate_encoding
-    from hda.terrain_picture import show_terrain
+    from hda.terrain.picture import show_terrain
 
     tolerate_encoding()
     tyro.cli(show_terrain)

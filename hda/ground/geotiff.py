@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hda.elevation_source import ElevationFile, ElevationFileError, known_heights
-from hda.map_scale import (
+from hda.ground.elevation_source import ElevationFile, ElevationFileError, known_heights
+from hda.ground.map_scale import (
     GREATEST,
     UNCORRECTED,
     Ellipsoid,

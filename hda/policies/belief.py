@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from guidance.kernel import compile_kernel
-from hda.lidar import Lidar
-from hda.observation import Observation
+from hda.sensing.lidar import Lidar
+from hda.task.observation import Observation
 
 LEVELS = np.array([0.0, 0.1, 0.25, 0.4, 0.6, 0.75, 0.9, 1.0])
 """Values that V_P is taken to have; the first half is unsafe ground."""

@@ -27,7 +27,7 @@ class ElevationFile:
         read: gives rows first to last - 1 and columns first to last - 1 as float64 [m], NaN where unknown;
             arguments: first row, last row, first column, last column.
         map_scale: true metres per metre of the map, north and east, which `pixel_size` holds already; 1 where
-            the two agree within `hda.map_scale.UNCORRECTED`.
+            the two agree within `hda.ground.map_scale.UNCORRECTED`.
         kind: type of the stored numbers.
         scale: [m] of one stored unit.
         offset: [m] height of a stored zero.

@@ -13,13 +13,13 @@ from guidance.constants import MOON_GRAVITY
 from guidance.lander import PAPER_LANDER, Lander
 from guidance.state import State
 from guidance.validation import finite_number, finite_vector
-from hda.lidar import Lidar
-from hda.observation import ScenarioView
-from hda.own_terrain import OwnTerrain
-from hda.random_streams import EpisodeStreams
-from hda.safety_map import SafetyCriteria
-from hda.terrain import TerrainParameters
-from hda.tile import Tile
+from hda.sensing.lidar import Lidar
+from hda.task.observation import ScenarioView
+from hda.ground.own_terrain import OwnTerrain
+from hda.task.random_streams import EpisodeStreams
+from hda.safety.safety_map import SafetyCriteria
+from hda.terrain.generator import TerrainParameters
+from hda.ground.tile import Tile
 
 _TARGET_DRAWS = 10_000
 

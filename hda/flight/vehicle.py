@@ -20,8 +20,8 @@ from guidance.lander import Lander
 from guidance.state import State
 from guidance.thrust_limits import limit_into, pointing_angle
 from guidance.zem_zev import zem_zev_into
-from hda import held_thrust
-from hda.held_thrust import FLYING, TOUCHDOWN, VehicleNumbers, fall_to_plane, hold_period
+from hda.flight import held_thrust
+from hda.flight.held_thrust import FLYING, TOUCHDOWN, VehicleNumbers, fall_to_plane, hold_period
 from hda.policy import Decision, ZemZevCommand
 
 _Log = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]  # time, path, commanded thrust

@@ -14,7 +14,7 @@ from guidance.dynamics import propagate_into
 from guidance.kernel import compile_kernel
 
 FLYING, TOUCHDOWN, TANK_EMPTY = 0, 1, 2
-"""Where a period leaves the vehicle: `hda.vehicle.FlightStatus` as plain numbers."""
+"""Where a period leaves the vehicle: `hda.flight.vehicle.FlightStatus` as plain numbers."""
 
 VehicleNumbers = tuple[float, float, float, float, float]
 """Least thrust [N], greatest thrust [N], exhaust velocity [m/s], dry mass [kg], pointing limit [rad]."""

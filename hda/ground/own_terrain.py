@@ -2,7 +2,7 @@
 
 Tiles are counted from the south-west corner of the file, row by row; what is left over at its north and east
 edges is not used. A tile of which more than a tenth is unknown is left out. A value that only looks like
-ground is refused (`hda.undeclared_voids`).
+ground is refused (`hda.ground.undeclared_voids`).
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hda.elevation_file import ElevationFile, NoData, no_data_values, open_elevation
-from hda.ground_survey import survey_tile
-from hda.map_scale import GREATEST
-from hda.resampling import axis_weights, resample
-from hda.undeclared_voids import TileFinding, judge_tile, refuse_voids
+from hda.ground.elevation_file import ElevationFile, NoData, no_data_values, open_elevation
+from hda.ground.survey import survey_tile
+from hda.ground.map_scale import GREATEST
+from hda.ground.resampling import axis_weights, resample
+from hda.ground.undeclared_voids import TileFinding, judge_tile, refuse_voids
 
 OWN_SPLIT = "own"
 TILE_SIZE = 1000

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 from rich.console import Console
 
-from hda.dtm_library import Ground, load_tile, prepare_tiles
-from hda.own_terrain import OWN_SPLIT, OwnTerrain
-from hda.scenario import Preset, StartConditions
-from hda.tile import Tile
-from hda.undeclared_voids import name_tiles
+from hda.ground.library import Ground, load_tile, prepare_tiles
+from hda.ground.own_terrain import OWN_SPLIT, OwnTerrain
+from hda.task.scenario import Preset, StartConditions
+from hda.ground.tile import Tile
+from hda.ground.undeclared_voids import name_tiles
 
 _DRAWS = 10_000
 _FOUND = 20

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from guidance.two_impulse import divert_cost
-from hda.observation import Observation, ScenarioView
+from hda.task.observation import Observation, ScenarioView
 from hda.policies.hazard_aware import load_kernels
 from hda.site_selection import Site, safe_clearance
-from hda.tile import Tile
+from hda.ground.tile import Tile
 
 _BLOCK = 8  # [m] side of the blocks that are priced by their middle first
 

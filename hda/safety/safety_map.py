@@ -17,8 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from guidance.kernel import compile_parallel_kernel
 from guidance.validation import finite_number
-from hda.lander_footprint import LanderFootprint, make_footprint
-from hda.stable_planes import assess_rows
+from hda.safety.lander_footprint import LanderFootprint, make_footprint
+from hda.safety.stable_planes import assess_rows
 
 
 @dataclass(frozen=True)
