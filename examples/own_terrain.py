@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 import tyro
 
-from hda.task.presets import PAPER_TERRAIN
 from hda.terrain.generator import generate_terrain, terrain_rng
+from hda.terrain.settings import PAPER_TERRAIN
 
 
 def write_site(path: tyro.conf.Positional[Path], seed: int = 50_000) -> None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import difflib
 import math
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -42,3 +44,11 @@ def finite_number(
     if number > at_most:
         raise ValueError(f"{name} must be at most {at_most:g}, got {number:g}")
     return number
+
+
+def unknown_name(kind: str, name: object, valid: Iterable[str]) -> str:
+    """Say that a name is unknown, with the nearest valid names first."""
+    names = sorted(valid)
+    near = difflib.get_close_matches(str(name), names, n=3, cutoff=0.4)
+    hint = f"; did you mean {' or '.join(near)}?" if near else ""
+    return f"unknown {kind} {name!r}{hint} (valid: {', '.join(names)})"

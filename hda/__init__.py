@@ -10,32 +10,42 @@ import hda.own_guidance  # noqa: F401 - before anything of `guidance`: another o
 from guidance.exports import lazy_exports
 
 if TYPE_CHECKING:
+    from hda.flight.episode import fly
+    from hda.flight.outcome import Ending, Outcome
+    from hda.flight.record import EpisodeRecord
     from hda.ground.library import SPLITS, Ground, load_tile, prepare_tiles
-    from hda.flight.episode import EpisodeRecord, fly
+    from hda.ground.tile import Tile, make_tile
+    from hda.policies.entry import PolicyEntry
+    from hda.policy import Decision, DecisionStatus, Policy, PrivilegedPolicy, ZemZevCommand
+    from hda.registry import make_policy, policy_names, register_policy
+    from hda.safety.criteria import SafetyCriteria
+    from hda.safety.safety_map import SafetyMap, assess_safety
     from hda.sensing.lidar import Lidar
     from hda.task.observation import Observation, ScenarioView
-    from hda.flight.outcome import Ending, Outcome
-    from hda.policy import Decision, DecisionStatus, Policy, PrivilegedPolicy, ZemZevCommand
-    from hda.task.presets import PRESETS, place_preset, sample_scenario
-    from hda.registry import PolicyEntry, make_policy, policy_names, register_policy
-    from hda.safety.safety_map import SafetyCriteria, SafetyMap, assess_safety
-    from hda.task.scenario import Preset, Rules, Scenario, StartConditions
+    from hda.task.own_ground import place_preset
+    from hda.task.presets import PRESETS, Preset
+    from hda.task.rules import Rules, StartConditions
+    from hda.task.scenario import Scenario, sample_scenario
     from hda.terrain.generator import TerrainParameters, generate_terrain
-    from hda.ground.tile import Tile, make_tile
 
 _HOMES = {
+    "hda.flight.episode": ("fly",),
+    "hda.flight.outcome": ("Ending", "Outcome"),
+    "hda.flight.record": ("EpisodeRecord",),
     "hda.ground.library": ("SPLITS", "Ground", "load_tile", "prepare_tiles"),
-    "hda.flight.episode": ("EpisodeRecord", "fly"),
+    "hda.ground.tile": ("Tile", "make_tile"),
+    "hda.policies.entry": ("PolicyEntry",),
+    "hda.policy": ("Decision", "DecisionStatus", "Policy", "PrivilegedPolicy", "ZemZevCommand"),
+    "hda.registry": ("make_policy", "policy_names", "register_policy"),
+    "hda.safety.criteria": ("SafetyCriteria",),
+    "hda.safety.safety_map": ("SafetyMap", "assess_safety"),
     "hda.sensing.lidar": ("Lidar",),
     "hda.task.observation": ("Observation", "ScenarioView"),
-    "hda.flight.outcome": ("Ending", "Outcome"),
-    "hda.policy": ("Decision", "DecisionStatus", "Policy", "PrivilegedPolicy", "ZemZevCommand"),
-    "hda.task.presets": ("PRESETS", "place_preset", "sample_scenario"),
-    "hda.registry": ("PolicyEntry", "make_policy", "policy_names", "register_policy"),
-    "hda.safety.safety_map": ("SafetyCriteria", "SafetyMap", "assess_safety"),
-    "hda.task.scenario": ("Preset", "Rules", "Scenario", "StartConditions"),
+    "hda.task.own_ground": ("place_preset",),
+    "hda.task.presets": ("PRESETS", "Preset"),
+    "hda.task.rules": ("Rules", "StartConditions"),
+    "hda.task.scenario": ("Scenario", "sample_scenario"),
     "hda.terrain.generator": ("TerrainParameters", "generate_terrain"),
-    "hda.ground.tile": ("Tile", "make_tile"),
 }
 
 __all__ = [

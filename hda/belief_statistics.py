@@ -1,22 +1,21 @@
 """Count on the training tiles what the belief assumes: levels of V_P, and safe ground around seen ground.
 
 python -m hda.belief_statistics         counts, and prints them beside what is in use
-python -m hda.belief_statistics --write counts, and writes hda/surroundings.csv
+python -m hda.belief_statistics --write counts, and writes hda/policies/surroundings.csv
 """
 
 from __future__ import annotations
 
 import sys
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from guidance.console import tolerate_encoding
-from hda.policies.belief import LEVEL_SHARES, LEVELS
 from hda.ground.library import Ground, load_tile
+from hda.policies.belief import LEVEL_SHARES, LEVELS
+from hda.policies.surroundings import DISTANCE_EDGES, TABLE, safe_share_table, squared_distance
 from hda.task.presets import PRESETS
-from hda.policies.surroundings import DISTANCE_EDGES, safe_share_table, squared_distance
 
 TILES = range(40)
 LOOKS_PER_TILE = 6
@@ -84,9 +83,8 @@ def main() -> None:
     out("levels of V_P: " + " ".join(f"{share:.4f}" for share in levels) + "\n")
     out("        in use: " + " ".join(f"{share:.4f}" for share in LEVEL_SHARES) + "\n")
     if "--write" in sys.argv[1:]:
-        path = Path(__file__).with_name("surroundings.csv")
-        np.savetxt(path, table, fmt="%.5f", delimiter=",")
-        out(f"wrote {path}\n")
+        np.savetxt(TABLE, table, fmt="%.5f", delimiter=",")
+        out(f"wrote {TABLE}\n")
         return
     out(f"safe share: greatest change from what is in use {np.abs(table - safe_share_table()).max():.5f}\n")
 

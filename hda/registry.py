@@ -12,14 +12,12 @@ import re
 import sys
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass
 from importlib import metadata
 from typing import Any
 
+from guidance.validation import unknown_name
+from hda.policies.entry import AnyPolicy, PolicyEntry
 from hda.policy import Policy, PrivilegedPolicy
-from hda.task.presets import unknown_name
-
-AnyPolicy = Policy[Any] | PrivilegedPolicy
 
 ENTRY_POINT_GROUP = "lunar_hda.policies"
 
@@ -38,31 +36,6 @@ AGENTS = (
 """Names that `import rl` registers; this package may not import it, but may say so."""
 
 _NAME = re.compile(r"[a-z0-9][a-z0-9+._-]{0,59}")
-
-
-@dataclass(frozen=True)
-class PolicyEntry:
-    """One line of the registry.
-
-    Attributes:
-        name: name in tables; lower case, hyphens.
-        make: gives a new policy of that name.
-        summary: what it does, in one line.
-        privileged: it sees the true map; every table marks it.
-        slow: a decision takes more than about 50 ms; flown only when asked for.
-        preset: setting that it was made for, flown on others only when asked for; None: made for all.
-    """
-
-    name: str
-    make: Callable[[], AnyPolicy]
-    summary: str
-    privileged: bool = False
-    slow: bool = False
-    preset: str | None = None
-
-    def belongs_on(self, preset: str) -> bool:
-        """Whether tables of a setting hold it without being asked."""
-        return not self.slow and self.preset in (None, preset)
 
 
 _entries: dict[str, PolicyEntry] = {}

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from functools import lru_cache
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hda.task.observation import Observation, ScenarioView
-from hda.ground.tile import Tile
 
 Site = NDArray[np.float64]
 
@@ -107,52 +105,3 @@ class NearestSafeSite:
             return observation.target, True
         site = nearest_safe_site(observation, self.select_threshold)
         return (safest_site(observation) if site is None else site), True
-
-
-@lru_cache(maxsize=32)
-def safe_clearance(tile: Tile) -> NDArray[np.float32]:
-    """[m] from each cell's centre to the nearest unsafe cell's edge along an axis; shape of the tile.
-
-    Zero or less on unsafe cells; the outside of the map is unsafe.
-    """
-    from scipy.ndimage import distance_transform_edt
-
-    padded = np.pad(tile.deterministic, 1, constant_values=False)
-    distance = distance_transform_edt(padded)
-    return (np.asarray(distance)[1:-1, 1:-1] - 0.5).astype(np.float32)
-
-
-def nearest_clear_site(tile: Tile, target: Site, clearance: float) -> Site:
-    """Centre of the truly safe cell nearest to `target` with at least `clearance` [m] of safe ground around.
-
-    Where no cell has that much, the one with most is given.
-    """
-    room = safe_clearance(tile)
-    rows, columns = np.nonzero(room >= clearance)
-    if rows.size == 0:
-        rows, columns = (np.array([index]) for index in np.unravel_index(int(np.argmax(room)), room.shape))
-    square = (columns + 0.5 - target[0]) ** 2 + (rows + 0.5 - target[1]) ** 2
-    best = int(np.argmin(square))
-    return np.array([columns[best] + 0.5, rows[best] + 0.5, target[2]])
-
-
-@dataclass(frozen=True, eq=False)
-class OracleSite:
-    """Privileged: the truly safe cell nearest to the first target with some clearance.
-
-    Attributes:
-        truth: the tile that is being flown.
-        clearance: [m] of safe ground around the site.
-    """
-
-    truth: Tile = field(repr=False)
-    clearance: float = 2.0
-
-    def begin(self, view: ScenarioView) -> None:
-        """No site yet."""
-
-    def select(self, observation: Observation, memory: Site | None) -> tuple[Site, Site]:
-        """Choose once, then stay."""
-        if memory is None:
-            memory = nearest_clear_site(self.truth, observation.target, self.clearance)
-        return memory, memory

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from guidance.validation import finite_number
-from hda.task.observation import Observation
 from hda.policy import Decision, ZemZevCommand
-from hda.task.scenario import Range
+from hda.task.observation import Observation
+from hda.task.rules import Range
 
 ACTION_NAMES = ("position_gain", "velocity_gain", "time_to_go_step", "shift_x", "shift_y")
 """What each element of the action moves, in order."""

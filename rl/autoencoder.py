@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from torch import nn
 
 from hda.flight.episode import advance, begin_flight, observe
-from hda.task.presets import sample_scenario
-from hda.task.scenario import Preset
+from hda.task.presets import Preset
+from hda.task.scenario import sample_scenario
 from rl.action import decide_action
 from rl.artefacts import Tensors
 from rl.encoding import LATENT_SIZE

@@ -19,7 +19,7 @@ from hda.worker_pool import map_in_processes
 from rl.artefacts import Tensors
 
 if TYPE_CHECKING:
-    from hda.task.scenario import Preset
+    from hda.task.presets import Preset
     from rl.algorithms import AgentSettings
     from rl.scoring import Score
 

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 from hda.policies.adjusted_descent import AdjustedDescent
 from hda.policies.composition import ComposedPolicy
+from hda.policies.entry import PolicyEntry
 from hda.policies.zem_zev import FixedGainZemZev
-from hda.registry import PolicyEntry
 from rl.algorithms import WITH_MEMORY
 from rl.policy import AgentPolicy, AgentSite, shipped, weights_name
 from rl.recurrent_policy import RecurrentAgentPolicy

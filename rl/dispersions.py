@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, fields, replace
 
 from guidance.validation import finite_number
-from hda.task.scenario import Preset, Range
+from hda.task.presets import Preset
+from hda.task.rules import Range
 
 _START_RANGES = ("altitude", "distance", "descent_speed", "horizontal_speed", "mass", "target_area")
 

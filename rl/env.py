@@ -12,10 +12,10 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from hda.flight.episode import Flight, Step, advance, begin_flight, observe
-from hda.task.observation import Observation
 from hda.flight.outcome import Outcome
-from hda.task.presets import find_preset
-from hda.task.scenario import Preset, Scenario
+from hda.task.observation import Observation
+from hda.task.presets import Preset, find_preset
+from hda.task.scenario import Scenario
 from rl.action import PAPER_ACTIONS, ActionRanges, decide_action
 from rl.dispersions import Dispersions
 from rl.encoding import (

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 from hda.ground.library import Ground, tile_numbers
-from hda.task.presets import find_preset, sample_scenario
-from hda.task.scenario import Preset, Scenario
+from hda.task.presets import Preset, find_preset
+from hda.task.scenario import Scenario, sample_scenario
 from rl.dispersions import Dispersions
 
 

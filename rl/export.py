@@ -13,7 +13,7 @@ from rl.artefacts import WEIGHTS_FOLDER
 from rl.candidates import CHOICE_SEED, Candidate, Choice, best_of_run
 
 if TYPE_CHECKING:
-    from hda.task.scenario import Preset
+    from hda.task.presets import Preset
     from rl.algorithms import AgentSettings
 
 

@@ -22,7 +22,7 @@ from guidance.console import tolerate_encoding
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from hda.flight.episode import EpisodeRecord
+    from hda.flight.record import EpisodeRecord
 
 _OUT = Path("results/figures")
 
@@ -243,8 +243,8 @@ def _draw_flight(panels: Any, record: EpisodeRecord, name: str) -> None:
 def _fly(name: str, preset: str, study_seed: int, episode: int) -> EpisodeRecord:
     import rl  # noqa: F401 - registers the agents
     from hda.flight.episode import fly
-    from hda.task.presets import sample_scenario
     from hda.registry import make_policy
+    from hda.task.scenario import sample_scenario
 
     return fly(make_policy(name), sample_scenario(preset, study_seed, episode, "validation"))
 

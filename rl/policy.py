@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hda.task.observation import Observation, ScenarioView
 from hda.policy import Decision
-from hda.task.scenario import Range
+from hda.task.observation import Observation, ScenarioView
+from hda.task.rules import Range
 from rl.action import PAPER_ACTIONS, ActionRanges, decide_action
 from rl.artefacts import WEIGHTS_FOLDER, Artefact, ArtefactError, load_artefact, require
 from rl.encoding import ENCODING_VERSION, LATENT_SIZE, LAYOUTS, Layout, encode_observation

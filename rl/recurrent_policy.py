@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from hda.task.observation import Observation, ScenarioView
 from hda.flight.outcome import score_step
 from hda.policy import Decision
+from hda.task.observation import Observation, ScenarioView
 from rl.action import PAPER_ACTIONS, ActionRanges, decide_action
 from rl.artefacts import Artefact, ArtefactError, load_artefact
 from rl.encoding import LATENT_SIZE, Layout, encode_observation

@@ -9,8 +9,8 @@ import numpy as np
 
 from hda.flight.episode import fly
 from hda.policy import Policy
-from hda.task.presets import sample_scenario
-from hda.task.scenario import Preset
+from hda.task.presets import Preset
+from hda.task.scenario import sample_scenario
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ import torch
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from stable_baselines3.common.logger import Logger, TensorBoardOutputFormat
 
-from hda.task.scenario import Preset
+from hda.task.presets import Preset
 from rl.actor_export import actor_card
 from rl.algorithms import AgentSettings, make_algorithm
 from rl.artefacts import library_versions

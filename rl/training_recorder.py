@@ -12,7 +12,7 @@ import numpy as np
 from rich.progress import Progress
 from stable_baselines3.common.callbacks import BaseCallback
 
-from hda.task.scenario import Preset
+from hda.task.presets import Preset
 from rl.actor_export import actor_card, actor_tensors, policy_of
 from rl.algorithms import AgentSettings
 from rl.artefacts import save_artefact

@@ -16,10 +16,10 @@ from guidance.descent.residuals import fly_residuals
 from guidance.validation import finite_number
 from hda.flight.episode import advance, begin_flight, observe
 from hda.policy import PrivilegedPolicy
-from hda.task.presets import sample_scenario
 from hda.registry import make_policy
-from studies.terrain_timing import measure_terrain
+from hda.task.scenario import sample_scenario
 from studies.command_line import one_line_errors
+from studies.terrain_timing import measure_terrain
 
 
 @dataclass(frozen=True)

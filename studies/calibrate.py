@@ -23,8 +23,8 @@ import tyro
 from guidance.console import tolerate_encoding
 from guidance.validation import finite_number
 from hda.ground.library import Ground, remove_tiles
-from hda.task.presets import PRESETS, find_preset, sample_scenario
-from hda.task.scenario import Preset
+from hda.task.presets import PRESETS, Preset, find_preset
+from hda.task.scenario import sample_scenario
 from hda.terrain.generator import TerrainParameters
 from studies.command_line import one_line_errors
 from studies.executor import local_processes

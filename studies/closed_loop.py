@@ -26,9 +26,9 @@ from hda.flight.episode import fly
 from hda.policies.composition import ComposedPolicy, GuidanceLaw
 from hda.policies.planned_descent import PlannedDescent
 from hda.policies.zem_zev import FixedGainZemZev
-from hda.task.presets import find_preset, sample_scenario
-from hda.task.scenario import Preset
 from hda.site_selection import NearestSafeSite, SingleDivertSite, SiteSelection
+from hda.task.presets import Preset, find_preset
+from hda.task.scenario import sample_scenario
 from studies.command_line import one_line_errors
 from studies.executor import local_processes
 from studies.monte_carlo import Study, chunk_bounds, prepare_study

@@ -19,9 +19,9 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from guidance.console import tolerate_encoding
 from guidance.validation import finite_number
 from hda.ground.own_terrain import OWN_SPLIT
-from hda.task.presets import find_preset, place_preset
 from hda.registry import policy_entry
-from hda.task.scenario import Preset
+from hda.task.own_ground import place_preset
+from hda.task.presets import Preset, find_preset
 from studies.command_line import choose_policies, open_folder, resumable
 from studies.contract import check_contract
 from studies.executor import OpenExecutor, local_processes

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 
 from hda.flight.episode import advance, begin_flight, fly, observe
-from hda.task.observation import Observation
+from hda.policies.entry import AnyPolicy
 from hda.policy import Decision, Policy, PrivilegedPolicy
-from hda.task.presets import sample_scenario
-from hda.registry import AnyPolicy
-from hda.task.scenario import Preset, Scenario
+from hda.task.observation import Observation
+from hda.task.presets import Preset
+from hda.task.scenario import Scenario, sample_scenario
 from studies.rows import summarize_episode
 
 _CHECK_SEED = 4_000_000_000  # no study is flown at it

@@ -1,10 +1,10 @@
 """Why an episode failed, computed from its record and the true map.
 
 A landing on hazardous ground is followed back: was the site itself safe, had a look shown truly safe ground,
-was some of it within reach at that look (the outer bound of `hda.policies.privileged.knowable_ground`, so `out of reach` is
-proved), and what did the last look that read the site say of it? Beside the cause stand the single changes
-that would have made the episode a success: the same episode flown again with a noiseless map, an exact
-engine, or exact navigation. Where no safe ground had been seen such a success is another draw of luck.
+was some of it within reach at that look (the outer bound of `hda.policies.privileged.knowable_ground`, so
+`out of reach` is proved), and what did the last look that read the site say of it? Beside the cause stand the
+single changes that would have made the episode a success: the same episode flown again with a noiseless map,
+an exact engine, or exact navigation. Where no safe ground had been seen such a success is another draw of luck.
 """
 
 from __future__ import annotations
@@ -16,11 +16,13 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from hda.flight.episode import EpisodeRecord, fly, ground_point
-from hda.task.observation import Observation
+from hda.flight.episode import fly, ground_point
 from hda.flight.outcome import Ending
+from hda.flight.record import EpisodeRecord
 from hda.policies.privileged.knowable_ground import KnowableGround
-from hda.task.scenario import Preset, Scenario
+from hda.task.observation import Observation
+from hda.task.presets import Preset
+from hda.task.scenario import Scenario
 from studies.monte_carlo import Study
 
 SAFE_READING = 0.5

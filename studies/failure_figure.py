@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hda.flight.episode import EpisodeRecord, ground_point
+from hda.flight.episode import ground_point
+from hda.flight.record import EpisodeRecord
 from hda.task.observation import Observation
 from studies.figures import COLORS, draw_ground_track
 

@@ -19,10 +19,10 @@ from rich.console import Console
 from rich.progress import track
 
 from guidance.console import tolerate_encoding
-from guidance.validation import finite_number
+from guidance.validation import finite_number, unknown_name
 from hda.flight.episode import fly
-from hda.task.presets import PRESETS, sample_scenario, unknown_name
-from hda.task.scenario import Preset
+from hda.task.presets import PRESETS, Preset
+from hda.task.scenario import sample_scenario
 from studies.command_line import one_line_errors, open_folder
 from studies.failure_causes import Cause, Failure, explain_failure, find_remedies
 from studies.flights import ENDINGS

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hda.flight.episode import EpisodeRecord, fly
-from hda.task.presets import sample_scenario
+from hda.flight.episode import fly
+from hda.flight.record import EpisodeRecord
+from hda.task.scenario import sample_scenario
 from studies.histograms import MeasureHistograms
 from studies.monte_carlo import Study
 from studies.scores import StudyScores

@@ -12,10 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hda.flight.episode import EpisodeRecord, fly
-from hda.policy import ZemZevCommand
-from hda.task.presets import sample_scenario
+from hda.flight.episode import fly
+from hda.flight.record import EpisodeRecord
 from hda.ground.tile import Tile
+from hda.policy import ZemZevCommand
+from hda.task.scenario import sample_scenario
 from studies.figures import save_flight
 from studies.monte_carlo import Study
 from studies.scores import StudyScores

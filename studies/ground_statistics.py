@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hda.policies.privileged.oracle import safe_clearance
 from hda.task.scenario import Scenario
-from hda.site_selection import safe_clearance
 
 SPECK_RADIUS = 2.0
 """[m] safe ground that no disc of this radius fits into is a speck."""

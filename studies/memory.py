@@ -29,8 +29,8 @@ import tyro
 from rich.console import Console
 
 from guidance.console import tolerate_encoding
-from guidance.validation import finite_number
-from hda.task.presets import find_preset, unknown_name
+from guidance.validation import finite_number, unknown_name
+from hda.task.presets import find_preset
 from rl.algorithms import RECIPES
 from rl.candidates import Choice
 from rl.policy import shipped, weights_name

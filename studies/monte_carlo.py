@@ -17,11 +17,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from hda.ground.library import Ground, prepare_tiles
 from hda.flight.episode import fly
-from hda.task.presets import sample_scenario
-from hda.registry import AnyPolicy, make_policy, policy_entry
-from hda.task.scenario import Preset
+from hda.ground.library import Ground, prepare_tiles
+from hda.policies.entry import AnyPolicy
+from hda.registry import make_policy, policy_entry
+from hda.task.presets import Preset
+from hda.task.scenario import sample_scenario
 from studies.executor import ClusterExecutor, OpenExecutor, WorkerDiedError, advise_script
 from studies.rows import EpisodeRow, summarize_episode
 

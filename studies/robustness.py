@@ -22,11 +22,11 @@ from rich.progress import track
 
 from guidance.console import tolerate_encoding
 from guidance.validation import finite_number
-from hda.ground.library import Ground, load_tile, tile_numbers
 from hda.flight.episode import fly
-from hda.task.presets import find_preset, sample_scenario
+from hda.ground.library import Ground, load_tile, tile_numbers
 from hda.registry import policy_entry
-from hda.task.scenario import Preset
+from hda.task.presets import Preset, find_preset
+from hda.task.scenario import sample_scenario
 from studies.command_line import choose_policies, open_folder, resumable
 from studies.failure_causes import explain_failure
 from studies.monte_carlo import Study

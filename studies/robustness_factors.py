@@ -6,10 +6,11 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from hda.terrain.islands import IslandField
-from hda.task.presets import unknown_name
-from hda.task.scenario import Preset, Range
+from guidance.validation import unknown_name
+from hda.task.presets import Preset
+from hda.task.rules import Range
 from hda.terrain.generator import TerrainParameters
+from hda.terrain.islands import IslandField
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, fields
 
-from hda.flight.episode import EpisodeRecord
+from hda.flight.record import EpisodeRecord
 
 RATIOS = ("safe_site", "success")
 """Columns whose ratios stand in the table."""

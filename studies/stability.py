@@ -21,8 +21,7 @@ from rich.table import Table
 
 from guidance.console import tolerate_encoding
 from guidance.validation import finite_number
-from hda.task.presets import find_preset
-from hda.task.scenario import Preset
+from hda.task.presets import Preset, find_preset
 from studies.command_line import one_line_errors, open_folder
 from studies.stability_report import conclude
 from studies.stability_sweep import GainRow, MarginRow, Requirement, gain_box, gain_row, margin_row

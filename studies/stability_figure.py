@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hda.task.scenario import Preset
+from hda.task.presets import Preset
 from studies.figures import COLORS
 from studies.stability_sweep import POSITION_GAINS, VELOCITY_GAINS, Requirement, descend
 from studies.zem_zev_flight import flight_powers

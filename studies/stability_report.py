@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from hda.task.scenario import Preset
+from hda.task.presets import Preset
 from studies.stability_sweep import (
     POSITION_GAINS,
     VELOCITY_GAINS,

@@ -9,7 +9,7 @@ import numpy as np
 
 from guidance.state import State
 from guidance.zem_zev import time_to_go
-from hda.task.scenario import Preset
+from hda.task.presets import Preset
 from studies.zem_zev_flight import (
     Clock,
     error_growth,

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from guidance.validation import finite_number
-from hda.ground.library import Ground, prepare_tiles
 from hda.flight.episode import fly
-from hda.task.presets import find_preset, sample_scenario
-from hda.registry import AnyPolicy, PolicyEntry, describe_policy, policy_entry
-from hda.task.scenario import Preset
+from hda.ground.library import Ground, prepare_tiles
+from hda.policies.entry import AnyPolicy, PolicyEntry
+from hda.registry import describe_policy, policy_entry
+from hda.task.presets import Preset, find_preset
+from hda.task.scenario import sample_scenario
 from studies.statistics import Interval, least_passing, wilson_interval
 
 _MEASURES = ("safe_site", "success")

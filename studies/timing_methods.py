@@ -14,7 +14,7 @@ from guidance.descent.problem import LandingProblem
 from guidance.pdg.solve import DEFAULT_NODES
 from guidance.reference.casadi_planner import plan_casadi
 from guidance.reference.nonlinear_program import NonlinearSolver, fatrop_present
-from hda.task.presets import sample_scenario
+from hda.task.scenario import sample_scenario
 from studies.timing_peer import gfold_present, plan_gfold
 
 PEER_NODES = 30

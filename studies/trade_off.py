@@ -19,11 +19,11 @@ from rich.console import Console
 from rich.progress import track
 
 from guidance.console import tolerate_encoding
-from guidance.validation import finite_number
+from guidance.validation import finite_number, unknown_name
 from hda.policies.privileged.knowable_ground import could_have_landed, least_propellant
-from hda.task.presets import find_preset, sample_scenario, unknown_name
 from hda.registry import policy_entry
-from hda.task.scenario import Preset
+from hda.task.presets import Preset, find_preset
+from hda.task.scenario import sample_scenario
 from studies.command_line import choose_policies, open_folder, resumable
 from studies.monte_carlo import Study
 from studies.point_score import score_rows

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from dataclasses import fields, replace
 
+from guidance.validation import unknown_name
 from hda.policies.adjusted_descent import AdjustedDescent
 from hda.policies.composition import ComposedPolicy
 from hda.policies.hazard_aware import HazardAwareSite
 from hda.policies.site_price import HazardAwareWeights
-from hda.task.presets import unknown_name
 
 SWEEP: dict[str, tuple[float, ...]] = {
     "failure_cost": (2.0, 20.0, 200.0, 20000.0),

@@ -50,8 +50,8 @@ def test_every_python_block_of_the_documentation_runs(page: str) -> None:
 def test_python_block_of_contributing_runs() -> None:
     """It stands for a line among those of the registry, so it is given what they import."""
     from hda.policies.composition import ComposedPolicy
+    from hda.policies.entry import PolicyEntry
     from hda.policies.planned_descent import PlannedDescent
-    from hda.registry import PolicyEntry
     from hda.site_selection import NearestSafeSite
 
     blocks = python_blocks("CONTRIBUTING.md")

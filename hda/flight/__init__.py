@@ -1,1 +1,53 @@
-"""TODO wing."""
+"""The simulator: a vehicle between two looks, an episode from look to look, and how it ended.
+
+`fly` is the one loop; the Gymnasium environments step through the same functions. It imports the task and
+the seam (`hda.policy`), no policy.
+"""
+
+from typing import TYPE_CHECKING
+
+from guidance.exports import lazy_exports
+
+if TYPE_CHECKING:
+    from hda.flight.episode import advance, begin_flight, fly, observe
+    from hda.flight.outcome import Ending, Outcome
+    from hda.flight.record import EpisodeRecord
+    from hda.flight.vehicle import FlightErrors, FlightStatus, Segment, fly_interval
+
+_HOMES = {
+    "hda.flight.episode": (
+        "fly",
+        "observe",
+        "advance",
+        "begin_flight",
+    ),
+    "hda.flight.outcome": (
+        "Ending",
+        "Outcome",
+    ),
+    "hda.flight.record": ("EpisodeRecord",),
+    "hda.flight.vehicle": (
+        "FlightErrors",
+        "FlightStatus",
+        "Segment",
+        "fly_interval",
+    ),
+}
+
+__all__ = [
+    "Ending",
+    "EpisodeRecord",
+    "FlightErrors",
+    "FlightStatus",
+    "Outcome",
+    "Segment",
+    "advance",
+    "begin_flight",
+    "fly",
+    "fly_interval",
+    "observe",
+]
+
+__getattr__, __dir__ = lazy_exports(
+    __name__, {name: home for home, names in _HOMES.items() for name in names}
+)

@@ -14,12 +14,13 @@ from numpy.typing import NDArray
 
 from guidance.state import State
 from guidance.upright_time import upright_time_to_go
+from hda.flight.outcome import Outcome, RewardTerms, classify, score_step
+from hda.flight.record import EpisodeRecord
+from hda.flight.vehicle import FlightErrors, FlightStatus, Segment, fly_interval
+from hda.policy import Decision, Policy, PrivilegedPolicy
 from hda.sensing.lidar import look
 from hda.task.observation import Observation
-from hda.flight.outcome import Outcome, RewardTerms, classify, score_step
-from hda.policy import Decision, Policy, PrivilegedPolicy
 from hda.task.scenario import Scenario
-from hda.flight.vehicle import FlightErrors, FlightStatus, Segment, fly_interval
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,97 +59,6 @@ class Step:
     truncated: bool
     reward: RewardTerms
     slant_angle: float
-
-
-@dataclass(frozen=True, eq=False)
-class EpisodeRecord:
-    """One flown episode. n nodes have n - 1 intervals.
-
-    Attributes:
-        policy: name of the policy.
-        scenario: what was flown.
-        observations: every look, in order.
-        decisions: every decision, in order.
-        segments: the flown path after each decision, at the control rate.
-        rewards: reward terms of each decision.
-        outcome: how it ended.
-        minimum_slant_angle: [rad] least elevation of the lander seen from the current target at decision
-            instants.
-        decision_time: [s] shape (decisions,), wall time that the policy took; not reproducible.
-    """
-
-    policy: str
-    scenario: Scenario
-    observations: tuple[Observation, ...]
-    decisions: tuple[Decision, ...]
-    segments: tuple[Segment, ...]
-    rewards: tuple[RewardTerms, ...]
-    outcome: Outcome
-    minimum_slant_angle: float
-    decision_time: NDArray[np.float64]
-
-    @property
-    def time(self) -> NDArray[np.float64]:
-        """[s] shape (n,), time of each node."""
-        parts = [self.observations[k].time + s.time[:-1] for k, s in enumerate(self.segments)]
-        last = self.observations[len(self.segments) - 1].time + self.segments[-1].time[-1:]
-        return np.concatenate([*parts, last])
-
-    @property
-    def path(self) -> NDArray[np.float64]:
-        """Shape (n, 7): position [m], velocity [m/s] and mass [kg] at each node."""
-        return np.concatenate([*(s.path[:-1] for s in self.segments), self.segments[-1].path[-1:]])
-
-    @property
-    def position(self) -> NDArray[np.float64]:
-        """[m] shape (n, 3)."""
-        return self.path[:, :3]
-
-    @property
-    def velocity(self) -> NDArray[np.float64]:
-        """[m/s] shape (n, 3)."""
-        return self.path[:, 3:6]
-
-    @property
-    def mass(self) -> NDArray[np.float64]:
-        """[kg] shape (n,)."""
-        return self.path[:, 6]
-
-    @property
-    def commanded_thrust(self) -> NDArray[np.float64]:
-        """[N] shape (n - 1, 3), command within the vehicle's limits, held over each interval."""
-        return np.concatenate([s.commanded for s in self.segments])
-
-    @property
-    def thrust(self) -> NDArray[np.float64]:
-        """[N] shape (n - 1, 3), applied over each interval: the command with the thrust error."""
-        return np.concatenate([s.commanded * (1.0 + s.thrust_error) for s in self.segments])
-
-    @property
-    def maximum_thrust(self) -> float:
-        """[N] greatest applied thrust."""
-        return float(np.sqrt((self.thrust**2).sum(axis=1).max()))
-
-    @property
-    def maximum_tilt(self) -> float:
-        """[rad] greatest angle of the thrust from the vertical while the engine burnt; 0 if it never did."""
-        east, north, up = self.commanded_thrust.T + 0.0  # no thrust reads as 0, and -0.0 as 0.0
-        return float(np.arctan2(np.hypot(east, north), up).max())
-
-    @property
-    def pointing_limited(self) -> int:
-        """Control periods in which the lander's pointing limit changed the commanded thrust."""
-        return sum(segment.pointing_limited for segment in self.segments)
-
-    @property
-    def total_reward(self) -> float:
-        """Sum of the rewards, undiscounted."""
-        return float(sum(terms.total for terms in self.rewards))
-
-    @property
-    def fallbacks(self) -> int:
-        """Decisions that fell back from the policy's own law."""
-        return sum(decision.status.is_fallback for decision in self.decisions)
 
 
 def elevation_angle(position: NDArray[np.float64], target: NDArray[np.float64]) -> float:

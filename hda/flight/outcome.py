@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from guidance.lander import Lander
 from guidance.state import State
-from hda.task.scenario import Rules
+from hda.task.rules import Rules
 
 
 class Ending(StrEnum):

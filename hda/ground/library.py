@@ -25,9 +25,9 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from guidance.kernel import cache_folder
 from hda.ground.own_terrain import OWN_SPLIT, OwnTerrain, cut_tile
-from hda.safety.safety_map import SafetyCriteria
-from hda.terrain.generator import TerrainParameters, generate_terrain
 from hda.ground.tile import Tile, make_tile
+from hda.safety.criteria import SafetyCriteria
+from hda.terrain.generator import TerrainParameters, generate_terrain
 from hda.worker_pool import map_in_processes
 
 FORMAT_VERSION = 1

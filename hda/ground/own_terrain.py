@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hda.ground.elevation_file import ElevationFile, NoData, no_data_values, open_elevation
-from hda.ground.survey import survey_tile
 from hda.ground.map_scale import GREATEST
 from hda.ground.resampling import axis_weights, resample
+from hda.ground.survey import survey_tile
 from hda.ground.undeclared_voids import TileFinding, judge_tile, refuse_voids
 
 OWN_SPLIT = "own"

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from guidance.kernel import compile_kernel
-from hda.safety.safety_map import SafetyCriteria, assess_safety, elevation_array
+from hda.safety.criteria import SafetyCriteria
+from hda.safety.safety_map import assess_safety, elevation_array
 
 
 @dataclass(frozen=True, eq=False)

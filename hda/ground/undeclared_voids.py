@@ -1,9 +1,9 @@
 """Values of an elevation model that only look like ground, refused with what to do about them.
 
 A void that its file does not declare is one exact number over an area: a warp's zeros, -9999, the end of a
-type. As ground it would be perfectly flat and safe. It is known by what it looks like (`hda.ground.flat_areas`):
-most of its outline is a cliff. On ground of whole metres or of repeated pixels equal neighbours are common,
-so that an area must be larger there and its outline clearer.
+type. As ground it would be perfectly flat and safe. It is known by what it looks like
+(`hda.ground.flat_areas`): most of its outline is a cliff. On ground of whole metres or of
+repeated pixels equal neighbours are common, so that an area must be larger there and its outline clearer.
 """
 
 from __future__ import annotations

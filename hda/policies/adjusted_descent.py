@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from guidance.tracking.reference import TrackingReference
 from guidance.tracking.regulator import tracking_gains
 from guidance.tracking.retarget import shift_landing_point, velocity_change, within_pointing, within_thrust
-from hda.task.observation import Observation, ScenarioView
 from hda.policies.planned_descent import DescentMemory, PlannedDescent
 from hda.policy import Command, DecisionStatus, PlanCommand
+from hda.task.observation import Observation, ScenarioView
 
 
 @dataclass(frozen=True)

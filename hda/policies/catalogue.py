@@ -6,13 +6,14 @@ from guidance.tracking.soft_landing import SoftLandingOptions
 from hda.policies.adjusted_descent import AdjustedDescent
 from hda.policies.composition import ComposedPolicy, PrivilegedComposition
 from hda.policies.deferred_decision import DeferredDecisionPolicy
+from hda.policies.entry import PolicyEntry
 from hda.policies.hazard_aware import HazardAwareSite
-from hda.policies.privileged.knowable_ground import BestKnownSite
-from hda.policies.privileged.oracle_fuel import CheapestSafeSite
 from hda.policies.planned_descent import PlannedDescent
+from hda.policies.privileged.hindsight import BestKnownSite
+from hda.policies.privileged.oracle import OracleSite
+from hda.policies.privileged.oracle_fuel import CheapestSafeSite
 from hda.policies.zem_zev import FixedGainZemZev
-from hda.registry import PolicyEntry
-from hda.site_selection import NearestSafeSite, NominalSite, OracleSite, SingleDivertSite
+from hda.site_selection import NearestSafeSite, NominalSite, SingleDivertSite
 
 ENTRIES: tuple[PolicyEntry, ...] = (
     PolicyEntry(

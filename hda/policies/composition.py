@@ -9,10 +9,10 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from hda.task.observation import Observation, ScenarioView
+from hda.ground.tile import Tile
 from hda.policy import Command, Decision, DecisionStatus, Policy
 from hda.site_selection import SiteSelection
-from hda.ground.tile import Tile
+from hda.task.observation import Observation, ScenarioView
 
 
 class GuidanceLaw(Protocol):

@@ -19,14 +19,14 @@ from guidance.tracking.reference import TrackingReference
 from guidance.tracking.regulator import tracking_gains
 from guidance.tracking.soft_landing import SoftLanding, plan_soft_landing, sample_descent
 from guidance.validation import finite_number
-from hda.policies.belief import SafetyBelief
-from hda.task.observation import Observation, ScenarioView
 from hda.policies.adjusted_descent import AdjustedDescent
+from hda.policies.belief import SafetyBelief
 from hda.policies.hazard_aware import HazardAwareSite, fuse_look
 from hda.policies.planned_descent import DescentMemory
 from hda.policies.site_price import HazardAwareWeights, landing_probability
-from hda.policy import Decision, DecisionStatus, PlanCommand
 from hda.policies.surroundings import infer_unseen
+from hda.policy import Decision, DecisionStatus, PlanCommand
+from hda.task.observation import Observation, ScenarioView
 
 Array = NDArray[np.float64]
 

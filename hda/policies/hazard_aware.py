@@ -17,8 +17,6 @@ from guidance.constants import MOON_GRAVITY
 from guidance.lander import Lander
 from guidance.state import State
 from hda.policies.belief import SafetyBelief
-from hda.sensing.lidar import Lidar
-from hda.task.observation import Observation, ScenarioView
 from hda.policies.site_price import (
     LATTICE,
     HazardAwareWeights,
@@ -27,6 +25,8 @@ from hda.policies.site_price import (
     propellant_map,
 )
 from hda.policies.surroundings import infer_unseen
+from hda.sensing.lidar import Lidar
+from hda.task.observation import Observation, ScenarioView
 
 Array = NDArray[np.float64]
 

@@ -14,9 +14,9 @@ from guidance.state import State
 from guidance.tracking.reference import TrackingReference
 from guidance.tracking.regulator import DEFAULT_WEIGHTS, TrackingWeights, tracking_gains
 from guidance.tracking.soft_landing import DEFAULT_OPTIONS, SoftLanding, SoftLandingOptions, plan_soft_landing
-from hda.task.observation import Observation, ScenarioView
 from hda.policies.zem_zev import FixedGainZemZev
 from hda.policy import Command, DecisionStatus, PlanCommand
+from hda.task.observation import Observation, ScenarioView
 
 
 @dataclass(frozen=True, eq=False)

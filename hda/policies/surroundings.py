@@ -22,13 +22,14 @@ DISTANCE_EDGES = np.array([1.2, 1.6, 2.1, 2.5, 3.2, 4.5, 6.0, 8.0, 11.0, 15.0, 2
 LARGEST_DISTANCE = 24
 """[m] distances are not told apart beyond this."""
 
-_TABLE = Path(__file__).with_name("surroundings.csv")
+TABLE = Path(__file__).with_name("surroundings.csv")
+"""Where the counted shares are kept; `hda.belief_statistics` writes it."""
 
 
 @lru_cache(maxsize=1)
 def safe_share_table() -> NDArray[np.float64]:
     """Share of safe ground, shape (classes, classes): row by distance to safe, column to unsafe cells."""
-    return np.loadtxt(_TABLE, delimiter=",")
+    return np.loadtxt(TABLE, delimiter=",")
 
 
 @lru_cache(maxsize=1)

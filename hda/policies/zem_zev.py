@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from guidance.upright_time import upright_time_to_go
-from hda.task.observation import Observation, ScenarioView
 from hda.policy import DecisionStatus, ZemZevCommand
+from hda.task.observation import Observation, ScenarioView
 
 
 @dataclass(frozen=True)

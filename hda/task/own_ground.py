@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 from rich.console import Console
 
+from hda.ground.elevation_file import NoData
 from hda.ground.library import Ground, load_tile, prepare_tiles
-from hda.ground.own_terrain import OWN_SPLIT, OwnTerrain
-from hda.task.scenario import Preset, StartConditions
+from hda.ground.own_terrain import OWN_SPLIT, OwnTerrain, open_own_terrain
 from hda.ground.tile import Tile
 from hda.ground.undeclared_voids import name_tiles
+from hda.task.presets import Preset, find_preset
+from hda.task.rules import StartConditions
 
 _DRAWS = 10_000
 _FOUND = 20
@@ -69,3 +72,45 @@ def _probe_tile(tile: Tile, start: StartConditions) -> tuple[bool, float]:
         if found == _FOUND:
             return True, most
     return False, most
+
+
+def place_preset(
+    preset: str | Preset,
+    file: Path,
+    *,
+    pixel_size: float | None = None,
+    band: int | None = None,
+    nodata: NoData = None,
+    flat_is_ground: bool = False,
+    hazard_share: float | None = None,
+    workers: int = 2,
+) -> Preset:
+    """Put a setting on a user's own ground: the same rules, starts, sensor and lander on their terrain.
+
+    Every tile is built, cached, and tried for first targets, so that what cannot be flown fails here. A tile
+    with too few of them is left out and named on stderr; `preset.terrain.too_safe` holds its number.
+    Scenarios are then drawn with `split="own"`.
+
+    Args:
+        preset: name of a preset, or a Preset.
+        file: GeoTIFF or .npy, see `hda.ground.own_terrain.open_own_terrain`.
+        pixel_size: [m] of an .npy file; 1 if left out.
+        band: of a GeoTIFF, counted from 1; needed where there are several.
+        nodata: numbers in the file that mean unknown ground, one or several, besides that which it declares.
+        flat_is_ground: an area of one exact height is ground, though it looks like a value that stands for
+            unknown ground.
+        hazard_share: in place of the preset's; a smaller one lets episodes begin over safer ground.
+        workers: processes that build tiles.
+
+    Returns:
+        The preset, named after both.
+
+    Raises:
+        ValueError: an argument is out of range, the file cannot be used, or no tile has enough places for a
+            first target.
+    """
+    setting = find_preset(preset)
+    if hazard_share is not None:
+        setting = replace(setting, start=replace(setting.start, hazard_share=hazard_share))
+    terrain = open_own_terrain(file, pixel_size, band=band, nodata=nodata, flat_is_ground=flat_is_ground)
+    return place_on_terrain(setting, terrain, workers)

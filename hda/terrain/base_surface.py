@@ -10,7 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from guidance.validation import finite_number
-from hda.terrain.gaussian_field import FieldSpectrum, fast_period, frequency_grid, make_spectrum, synthesise_field
+from hda.terrain.gaussian_field import (
+    FieldSpectrum,
+    fast_period,
+    frequency_grid,
+    make_spectrum,
+    synthesise_field,
+)
 
 SLOPE_BASELINE = 1.0  # [m] the step over which the RMS slope is stated
 

@@ -101,13 +101,3 @@ def _generate_rocks(
     column = np.floor(rocks.east / pixel_size).astype(np.intp) + margin
     rocks = rocks.keep((abundance[row, column] > islands.threshold) | spared)
     return rock_heights(rocks, parameters.size, pixel_size)
-
-
-if __name__ == "__main__":
-    import tyro
-
-    from guidance.console import tolerate_encoding
-    from hda.terrain.picture import show_terrain
-
-    tolerate_encoding()
-    tyro.cli(show_terrain)

@@ -13,10 +13,11 @@ import numpy as np
 import pytest
 
 import hda
-from hda.flight.episode import EpisodeRecord, Flight, Step, advance, begin_flight, fly, observe
-from hda.task.observation import Observation
+from hda.flight.episode import Flight, Step, advance, begin_flight, fly, observe
+from hda.flight.record import EpisodeRecord
 from hda.policy import Decision, DecisionStatus, PlanCommand, Policy, PrivilegedPolicy, ZemZevCommand
 from hda.registry import policy_entry
+from hda.task.observation import Observation
 from hda.task.scenario import Scenario
 from tests.equality import parts, same
 

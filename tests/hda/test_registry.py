@@ -10,10 +10,12 @@ import pytest
 import hda
 from hda import registry
 from hda.policies.composition import ComposedPolicy, PrivilegedComposition
+from hda.policies.entry import PolicyEntry
+from hda.policies.privileged.oracle import OracleSite
 from hda.policies.zem_zev import FixedGainZemZev
 from hda.policy import PrivilegedPolicy
-from hda.registry import PolicyEntry, policy_entry
-from hda.site_selection import NominalSite, OracleSite
+from hda.registry import policy_entry
+from hda.site_selection import NominalSite
 from studies.command_line import choose_policies
 
 

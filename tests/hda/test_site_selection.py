@@ -9,19 +9,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from guidance import State
-from hda.task.observation import Observation
+from hda.ground.tile import Tile
+from hda.policies.privileged.oracle import OracleSite, nearest_clear_site, safe_clearance
 from hda.site_selection import (
     NearestSafeSite,
     NominalSite,
-    OracleSite,
     SingleDivertSite,
-    nearest_clear_site,
     nearest_safe_site,
     observed_safety,
-    safe_clearance,
     safest_site,
 )
-from hda.ground.tile import Tile
+from hda.task.observation import Observation
 
 TARGET = np.array([500.0, 400.0, 50.0])
 VIEW: Any = None  # no selection here reads the view

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from guidance.state import State
-from hda.task.observation import Observation
 from hda.policy import ZemZevCommand
+from hda.task.observation import Observation
 from rl.action import ACTION_NAMES, ActionRanges, decide_action
 
 OBSERVATION = Observation(

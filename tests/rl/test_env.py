@@ -13,9 +13,11 @@ from gymnasium.utils.env_checker import check_env as gymnasium_check
 from stable_baselines3.common.env_checker import check_env as sb3_check
 
 import rl  # noqa: F401 - registers the environments
-from hda.flight.episode import EpisodeRecord, advance, begin_flight, fly, observe
+from hda.flight.episode import advance, begin_flight, fly, observe
 from hda.flight.outcome import score_step
-from hda.task.presets import PRESETS, sample_scenario
+from hda.flight.record import EpisodeRecord
+from hda.task.presets import PRESETS
+from hda.task.scenario import sample_scenario
 from rl.action import decide_action
 from rl.dispersions import Dispersions
 from rl.encoding import CURVED, PRINTED, RELATIVE

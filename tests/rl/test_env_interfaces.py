@@ -17,7 +17,8 @@ from stable_baselines3.common.monitor import Monitor
 
 import rl  # noqa: F401 - registers the environments
 from hda.flight.outcome import Ending
-from hda.task.presets import PRESETS, sample_scenario
+from hda.task.presets import PRESETS
+from hda.task.scenario import sample_scenario
 from rl.env import LunarHDAEnv, LunarHDAMapEnv
 from rl.episode_info import ENDING_CODES
 

@@ -10,7 +10,8 @@ from hypothesis.extra.numpy import arrays
 from hypothesis.strategies import floats
 
 from hda.flight.episode import fly
-from hda.task.presets import PRESETS, sample_scenario
+from hda.task.presets import PRESETS
+from hda.task.scenario import sample_scenario
 from rl.algorithms import RECIPES
 from rl.artefacts import load_artefact
 from rl.candidates import Choice, average_tensors, best_of_run

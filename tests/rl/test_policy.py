@@ -12,8 +12,8 @@ from hda.flight.episode import fly
 from hda.policies.composition import ComposedPolicy
 from hda.policies.zem_zev import FixedGainZemZev
 from hda.policy import Policy, ZemZevCommand
-from hda.task.presets import sample_scenario
 from hda.registry import make_policy
+from hda.task.scenario import sample_scenario
 from rl.actor_export import actor_card
 from rl.algorithms import RECIPES
 from rl.artefacts import ArtefactError, card_digest, save_artefact

@@ -12,7 +12,8 @@ from gymnasium import spaces
 
 from examples.memory_task import SETTINGS, Recall
 from hda.flight.episode import fly
-from hda.task.presets import PRESETS, sample_scenario
+from hda.task.presets import PRESETS
+from hda.task.scenario import sample_scenario
 from rl.actor_export import actor_card, actor_tensors, policy_of
 from rl.algorithms import RECURRENT_RECIPES, make_agent_with_memory
 from rl.artefacts import Artefact, ArtefactError, load_artefact, save_artefact

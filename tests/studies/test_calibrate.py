@@ -4,7 +4,8 @@ import math
 
 import pytest
 
-from hda.task.presets import PRESETS, sample_scenario
+from hda.task.presets import PRESETS
+from hda.task.scenario import sample_scenario
 from hda.terrain.generator import TerrainParameters
 from studies.calibrate import SEARCHES, fly_single_divert, interpolate_crossing, with_control_period
 from studies.ground_statistics import measure_ground

@@ -8,10 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hda.flight.episode import EpisodeRecord, fly
-from hda.task.presets import PRESETS, sample_scenario
+from hda.flight.episode import fly
+from hda.flight.record import EpisodeRecord
 from hda.registry import make_policy
-from hda.task.scenario import Preset, Range
+from hda.task.presets import PRESETS, Preset
+from hda.task.rules import Range
+from hda.task.scenario import sample_scenario
 from studies.compare import Comparison, compare
 from studies.failure_causes import (
     Cause,

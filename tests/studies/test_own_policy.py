@@ -14,8 +14,8 @@ import pytest
 
 import hda
 from hda import registry
-from hda.task.presets import PRESETS
 from hda.registry import policy_entry
+from hda.task.presets import PRESETS
 from studies.compare import Comparison, compare, plan_study
 from studies.contract import ContractError, check_contract
 from studies.statistics import least_passing

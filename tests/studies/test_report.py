@@ -18,7 +18,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hda.task.presets import PRESETS, sample_scenario
+from hda.task.presets import PRESETS
+from hda.task.scenario import sample_scenario
 from studies.compare import Comparison, compare
 from studies.flights import (
     FAILED_PER_POLICY,

@@ -8,8 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from hda.task.presets import PRESETS
-from hda.task.scenario import Preset
+from hda.task.presets import PRESETS, Preset
 from studies.points import Rows
 from studies.robustness import Robustness, plan_points, run_robustness
 from studies.robustness_breaks import find_breaks

@@ -13,8 +13,8 @@ from pathlib import Path
 
 import pytest
 
-from hda.task.presets import PRESETS
 from hda.registry import policy_entry, policy_names
+from hda.task.presets import PRESETS
 from studies.monte_carlo import Study, fly_chunk
 from studies.statistics import least_passing
 

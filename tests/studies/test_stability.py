@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from guidance import MOON_GRAVITY, Lander, State, zem_zev_acceleration
+from hda.flight.vehicle import FlightErrors, FlightStatus, fly_interval
 from hda.policy import Decision, DecisionStatus, ZemZevCommand
 from hda.task.presets import PRESETS
-from hda.flight.vehicle import FlightErrors, FlightStatus, fly_interval
 from studies.stability import Stability, study_stability
 from studies.stability_sweep import gain_box, mean_descent
 from studies.zem_zev_flight import (

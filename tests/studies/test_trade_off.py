@@ -13,8 +13,8 @@ from hda import registry
 from hda.flight.episode import fly
 from hda.policies.hazard_aware import HazardAwareSite
 from hda.policies.site_price import HazardAwareWeights
-from hda.task.presets import sample_scenario
 from hda.registry import make_policy
+from hda.task.scenario import sample_scenario
 from studies.point_score import PointScore
 from studies.statistics import Interval
 from studies.trade_off import TradeOff, find_front, plan_points, run_trade_off

@@ -12,8 +12,9 @@ from hypothesis.extra import numpy as arrays
 
 from hda.ground.elevation_file import ElevationFileError, open_elevation
 from hda.ground.own_terrain import open_own_terrain
-from hda.safety.safety_map import SafetyCriteria, assess_safety
 from hda.ground.tile import make_tile
+from hda.safety.criteria import SafetyCriteria
+from hda.safety.safety_map import assess_safety
 
 HEIGHTS = st.one_of(
     st.floats(-5.0, 5.0),

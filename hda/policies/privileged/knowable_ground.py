@@ -29,10 +29,10 @@ from numpy.typing import NDArray
 
 from guidance.kernel import compile_kernel
 from guidance.state import State
-from hda.task.observation import Observation, ScenarioView
-from hda.policies.privileged.oracle_fuel import CheapestSafeSite
-from hda.task.scenario import Rules, Scenario
 from hda.site_selection import Site
+from hda.task.observation import ScenarioView
+from hda.task.rules import Rules
+from hda.task.scenario import Scenario
 
 Array = NDArray[np.float64]
 
@@ -265,16 +265,3 @@ def least_propellant(scenario: Scenario) -> float:
     spared = math.sqrt(2.0) * ground.soft_speed + _ALLOWANCE
     burnt = state.mass * -math.expm1(-max(cost - spared, 0.0) / view.lander.exhaust_velocity)
     return burnt / (state.mass - view.lander.dry_mass)
-
-
-class BestKnownSite(CheapestSafeSite):
-    """Privileged: the cheapest truly safe site if a flight could have seen it, else the nearest such one."""
-
-    def choose(self, observation: Observation, view: ScenarioView) -> Site:
-        """The first target where nothing could have been known."""
-        ground = KnowableGround(observation.state, observation.target, observation.width, view)
-        site = super().choose(observation, view)
-        if ground.contains(site):
-            return site
-        known = nearest_known_site(ground, self.truth.deterministic)
-        return observation.target if known is None else known

@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from guidance.two_impulse import divert_cost
-from hda.task.observation import Observation, ScenarioView
-from hda.policies.hazard_aware import load_kernels
-from hda.site_selection import Site, safe_clearance
 from hda.ground.tile import Tile
+from hda.policies.hazard_aware import load_kernels
+from hda.policies.privileged.oracle import safe_clearance
+from hda.site_selection import Site
+from hda.task.observation import Observation, ScenarioView
 
 _BLOCK = 8  # [m] side of the blocks that are priced by their middle first
 

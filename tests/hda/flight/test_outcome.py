@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from guidance import PAPER_LANDER, State
 from hda.flight.outcome import Ending, Outcome, RewardWeights, classify, score_step
-from hda.task.scenario import Rules
+from hda.task.rules import Rules
 
 TARGET = np.array([400.0, 300.0, 50.0])
 INITIAL = State(np.array([300.0, 200.0, 950.0]), np.array([5.0, 5.0, -30.0]), 1200.0)

@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from hda.safety.criteria import SafetyCriteria
 from hda.safety.lander_footprint import make_footprint
-from hda.safety.safety_map import SafetyCriteria, SafetyMap, assess_safety
+from hda.safety.safety_map import SafetyMap, assess_safety
 from tests.oracles import algorithm_1
 
 NOISE = 0.05 / 3.0

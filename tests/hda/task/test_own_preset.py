@@ -7,8 +7,10 @@ import pytest
 
 from hda.ground.library import Ground, check_split, tile_numbers
 from hda.ground.own_terrain import OWN_SPLIT, OwnTerrain
-from hda.task.presets import PAPER_TERRAIN, place_preset, sample_scenario
+from hda.task.own_ground import place_preset
+from hda.task.scenario import sample_scenario
 from hda.terrain.generator import generate_terrain, terrain_rng
+from hda.terrain.settings import PAPER_TERRAIN
 
 
 @pytest.fixture(scope="module")

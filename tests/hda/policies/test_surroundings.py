@@ -7,7 +7,6 @@ from hypothesis import strategies as st
 
 from hda.belief_statistics import LOOK_WIDTHS
 from hda.ground.library import Ground, load_tile
-from hda.task.presets import PRESETS
 from hda.policies.surroundings import (
     DISTANCE_EDGES,
     LARGEST_DISTANCE,
@@ -15,6 +14,7 @@ from hda.policies.surroundings import (
     safe_share_table,
     squared_distance,
 )
+from hda.task.presets import PRESETS
 
 
 @settings(max_examples=40)

@@ -11,7 +11,8 @@ import hda
 from hda.flight.episode import fly
 from hda.sensing.lidar import Lidar
 from hda.task.random_streams import EpisodeStreams
-from hda.task.scenario import Rules, Scenario
+from hda.task.rules import Rules
+from hda.task.scenario import Scenario
 
 
 def with_errors(scenario: Scenario, position: float, velocity: float, dropout: float = 0.0) -> Scenario:

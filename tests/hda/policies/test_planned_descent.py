@@ -8,14 +8,14 @@ import pytest
 from guidance.state import State
 from guidance.zem_zev import time_to_go
 from hda.flight.episode import begin_flight, fly, observe
-from hda.task.observation import Observation
 from hda.policies.composition import ComposedPolicy
 from hda.policies.planned_descent import DescentMemory, PlannedDescent
+from hda.policies.privileged.oracle import OracleSite
 from hda.policies.zem_zev import FixedGainZemZev
 from hda.policy import DecisionStatus, PlanCommand, ZemZevCommand
-from hda.task.presets import find_preset, sample_scenario
-from hda.task.scenario import Scenario
-from hda.site_selection import OracleSite
+from hda.task.observation import Observation
+from hda.task.presets import find_preset
+from hda.task.scenario import Scenario, sample_scenario
 
 
 def scenario_of(episode: int, thrust_error: float = 0.05) -> Scenario:

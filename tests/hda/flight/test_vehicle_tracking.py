@@ -8,8 +8,8 @@ from guidance.lander import PAPER_LANDER
 from guidance.state import State
 from guidance.tracking.reference import TrackingReference, make_reference
 from guidance.tracking.soft_landing import plan_soft_landing
-from hda.policy import Decision, PlanCommand
 from hda.flight.vehicle import FlightErrors, FlightStatus, fly_interval
+from hda.policy import Decision, PlanCommand
 
 GRAVITY = np.array([0.0, 0.0, -1.62])
 GAINS = (0.9, 1.7)

@@ -12,14 +12,14 @@ from hypothesis import strategies as st
 from scipy.ndimage import distance_transform_edt
 from scipy.stats import norm
 
+from hda.safety.safety_map import assess_safety
+from hda.terrain.__main__ import show_terrain
 from hda.terrain.base_surface import BaseSurface, generate_base_surface, rms_slope
 from hda.terrain.craters import CraterPopulation, DepthLaw
-from hda.terrain.islands import IslandField, generate_island_field
-from hda.task.presets import PAPER_TERRAIN
-from hda.terrain.rocks import RockPopulation, rock_margin
-from hda.safety.safety_map import assess_safety
 from hda.terrain.generator import TerrainParameters, generate_terrain, terrain_rng
-from hda.terrain.picture import show_terrain
+from hda.terrain.islands import IslandField, generate_island_field
+from hda.terrain.rocks import RockPopulation, rock_margin
+from hda.terrain.settings import PAPER_TERRAIN
 from studies.terrain_timing import measure_terrain
 
 DEFAULT = TerrainParameters()

@@ -15,8 +15,6 @@ import hda.safety.safety_map
 import hda.terrain.generator
 from guidance.kernel import cache_folder
 from hda.ground import library as dtm_library
-from hda.terrain.base_surface import BaseSurface
-from hda.terrain.craters import CraterPopulation, DepthLaw
 from hda.ground.library import (
     SPLITS,
     Ground,
@@ -27,11 +25,13 @@ from hda.ground.library import (
     remove_tiles,
     tile_numbers,
 )
+from hda.ground.tile import Tile
+from hda.safety.criteria import SafetyCriteria
+from hda.terrain.base_surface import BaseSurface
+from hda.terrain.craters import CraterPopulation, DepthLaw
+from hda.terrain.generator import TerrainParameters
 from hda.terrain.islands import IslandField
 from hda.terrain.rocks import RockPopulation
-from hda.safety.safety_map import SafetyCriteria
-from hda.terrain.generator import TerrainParameters
-from hda.ground.tile import Tile
 
 SMALL_TERRAIN = TerrainParameters(
     size=100, craters=CraterPopulation(minimum_diameter=5.0, maximum_diameter=40.0)
@@ -387,7 +387,7 @@ mine, other = sys.argv[1:]
 terrain = hda.terrain.generator.TerrainParameters(
     size=100, craters=CraterPopulation(minimum_diameter=5.0, maximum_diameter=40.0)
 )
-ground = dtm_library.Ground(terrain, hda.safety.safety_map.SafetyCriteria())
+ground = dtm_library.Ground(terrain, hda.safety.criteria.SafetyCriteria())
 build = dtm_library.build_tile
 
 def build_together(ground, number):

@@ -8,12 +8,11 @@ import pytest
 from guidance.state import State
 from guidance.tracking.retarget import velocity_change
 from hda.flight.episode import begin_flight, observe
-from hda.task.observation import Observation
 from hda.policies.adjusted_descent import AdjustedDescent
 from hda.policies.planned_descent import DescentMemory, PlannedDescent
 from hda.policy import DecisionStatus, PlanCommand
-from hda.task.presets import sample_scenario
-from hda.task.scenario import Scenario
+from hda.task.observation import Observation
+from hda.task.scenario import Scenario, sample_scenario
 
 LAW = AdjustedDescent()
 

@@ -13,13 +13,16 @@ from rasterio.crs import CRS
 from rasterio.transform import Affine
 
 from hda.ground import library as dtm_library
-from hda.ground.library import Ground, check_split, load_tile, prepare_tiles, tile_numbers
 from hda.ground.elevation_file import ElevationFileError, open_elevation
+from hda.ground.library import Ground, check_split, load_tile, prepare_tiles, tile_numbers
 from hda.ground.own_terrain import OWN_SPLIT, OwnTerrain, cut_tile, open_own_terrain
-from hda.task.presets import PAPER_TERRAIN, PRESETS, place_preset, sample_scenario
 from hda.ground.resampling import axis_weights, resample
-from hda.safety.safety_map import SafetyCriteria
+from hda.safety.criteria import SafetyCriteria
+from hda.task.own_ground import place_preset
+from hda.task.presets import PRESETS
+from hda.task.scenario import sample_scenario
 from hda.terrain.generator import generate_terrain, terrain_rng
+from hda.terrain.settings import PAPER_TERRAIN
 from tests.ground_files import MOON, write_geotiff
 
 # rasterio 1.4 multiplies affine 3 transforms the old way, inside itself.

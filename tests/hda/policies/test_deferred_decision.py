@@ -5,7 +5,7 @@ import pytest
 
 from hda.flight.episode import begin_flight, fly, observe
 from hda.policies.deferred_decision import Candidates, DeferredDecisionOptions, DeferredDecisionPolicy
-from hda.task.presets import sample_scenario
+from hda.task.scenario import sample_scenario
 
 
 def test_chances_are_those_of_the_first_safe_candidate():

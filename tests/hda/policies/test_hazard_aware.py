@@ -11,9 +11,8 @@ from hypothesis import strategies as st
 import hda
 from guidance import State
 from guidance.two_impulse import divert_cost
-from hda.policies.belief import SafetyBelief
 from hda.flight.episode import begin_flight, fly, observe
-from hda.task.observation import Observation
+from hda.policies.belief import SafetyBelief
 from hda.policies.hazard_aware import HazardAwareMemory, HazardAwareSite
 from hda.policies.site_price import (
     HazardAwareWeights,
@@ -22,7 +21,8 @@ from hda.policies.site_price import (
     predict_next_look,
     price_sites,
 )
-from hda.task.presets import sample_scenario
+from hda.task.observation import Observation
+from hda.task.scenario import sample_scenario
 
 WEIGHTS = HazardAwareWeights()
 SIDE = 120

@@ -20,9 +20,10 @@ from hda.policies.privileged.knowable_ground import (
     least_propellant,
     nearest_known_site,
 )
-from hda.task.presets import PRESETS, sample_scenario
 from hda.registry import make_policy
-from hda.task.scenario import Preset, Range, Scenario
+from hda.task.presets import PRESETS, Preset
+from hda.task.rules import Range
+from hda.task.scenario import Scenario, sample_scenario
 
 UNPRIVILEGED = ("no-divert", "single-divert", "nearest-safe", "nearest-safe+convex", "hazard-aware")
 FEW_METRES = replace(PRESETS["paper"].start, altitude=Range(250.0, 300.0), mass=Range(1174.0, 1174.0))

@@ -17,8 +17,8 @@ from guidance import (
     zem_zev_acceleration,
 )
 from hda.flight.held_thrust import hold_period
-from hda.policy import Decision, ZemZevCommand
 from hda.flight.vehicle import FlightErrors, FlightStatus, Segment, fly_interval
+from hda.policy import Decision, ZemZevCommand
 from tests.oracles import flown_interval
 
 GRAVITY = np.array(MOON_GRAVITY)

@@ -11,11 +11,10 @@ from hypothesis import strategies as st
 
 import hda
 from guidance import MOON_GRAVITY, Lander, State, time_to_go, zem_zev_acceleration
-from hda.flight.episode import EpisodeRecord
-from hda.policy import Decision, DecisionStatus, PlanCommand, ZemZevCommand
-from hda.task.presets import PRESETS
-from hda.task.scenario import Preset
+from hda.flight.record import EpisodeRecord
 from hda.flight.vehicle import FlightErrors, Segment, fly_interval
+from hda.policy import Decision, DecisionStatus, PlanCommand, ZemZevCommand
+from hda.task.presets import PRESETS, Preset
 from tests.equality import same
 
 importlib.import_module("rl")  # adds the agents

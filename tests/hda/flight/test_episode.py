@@ -10,11 +10,13 @@ import pytest
 
 import hda
 from guidance import State
-from hda.flight.episode import EpisodeRecord, advance, begin_flight, elevation_angle, fly, observe
-from hda.sensing.lidar import look
+from hda.flight.episode import advance, begin_flight, elevation_angle, fly, observe
 from hda.flight.outcome import Ending
+from hda.flight.record import EpisodeRecord
 from hda.policy import Decision, Policy, ZemZevCommand
-from hda.task.scenario import Range, Rules, Scenario, StartConditions
+from hda.sensing.lidar import look
+from hda.task.rules import Range, Rules, StartConditions
+from hda.task.scenario import Scenario
 from tests.equality import same
 
 POLICIES = ("no-divert", "single-divert", "nearest-safe", "oracle")
