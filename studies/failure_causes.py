@@ -1,10 +1,11 @@
 """Why an episode failed, computed from its record and the true map.
 
-A landing on hazardous ground is followed back: was the site itself safe, had a look shown truly safe ground,
-was some of it within reach at that look (the outer bound of `hda.policies.privileged.knowable_ground`, so
-`out of reach` is proved), and what did the last look that read the site say of it? Beside the cause stand the
-single changes that would have made the episode a success: the same episode flown again with a noiseless map,
-an exact engine, or exact navigation. Where no safe ground had been seen such a success is another draw of luck.
+A landing on hazardous ground is followed back: was the site itself safe, had a look shown truly safe
+ground, was some of it within reach at that look (the outer bound of
+`hda.policies.privileged.knowable_ground`, so `out of reach` is proved), and what did the last look that
+read the site say of it? Beside the cause stand the single changes that would have made the episode a
+success: the same episode flown again with a noiseless map, an exact engine, or exact navigation. Where no
+safe ground had been seen such a success is another draw of luck.
 """
 
 from __future__ import annotations

@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-WINGS = sorted(path.parent for path in (ROOT / "guidance").rglob("__init__.py"))
+PACKAGES = ("guidance", "hda")
+WINGS = sorted(path.parent for package in PACKAGES for path in (ROOT / package).rglob("__init__.py"))
 NAMES = [str(wing.relative_to(ROOT)).replace("/", ".") for wing in WINGS]
 MOST_MODULES = 14
 MOST_LINES = 300
