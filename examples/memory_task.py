@@ -14,8 +14,8 @@ import gymnasium
 import numpy as np
 from gymnasium import spaces
 
-from rl.recurrent_hyperparameters import Hyperparameters
-from rl.td3_lstm import RecurrentTD3
+from rl.learning.recurrent.hyperparameters import Hyperparameters
+from rl.learning.recurrent.td3_lstm import RecurrentTD3
 
 
 class Recall(gymnasium.Env):

@@ -118,7 +118,9 @@ def describe_policy(target: object, origin: str) -> PolicyEntry:
 
 def _agents_hint(name: object) -> str:
     """Say how the agents come into the registry, where a name means one and nobody has registered them."""
-    if "rl.catalogue" in sys.modules or not difflib.get_close_matches(str(name), AGENTS, n=1, cutoff=0.8):
+    if "rl.policies.catalogue" in sys.modules or not difflib.get_close_matches(
+        str(name), AGENTS, n=1, cutoff=0.8
+    ):
         return ""
     return "; `import rl` registers the agents"
 

@@ -11,21 +11,21 @@ import gymnasium
 
 import hda
 from guidance.exports import lazy_exports
-from rl.catalogue import entries
+from rl.policies.catalogue import entries
 
 if TYPE_CHECKING:
-    from rl.action import ActionRanges, decide_action
-    from rl.artefacts import ArtefactError
-    from rl.dispersions import Dispersions
-    from rl.env import LunarHDAEnv, LunarHDAMapEnv
-    from rl.policy import AgentPolicy, AgentSite
+    from rl.environment.action import ActionRanges, decide_action
+    from rl.environment.dispersions import Dispersions
+    from rl.environment.env import LunarHDAEnv, LunarHDAMapEnv
+    from rl.inference.artefacts import ArtefactError
+    from rl.policies.actor import AgentPolicy, AgentSite
 
 _HOMES = {
-    "rl.action": ("ActionRanges", "decide_action"),
-    "rl.artefacts": ("ArtefactError",),
-    "rl.dispersions": ("Dispersions",),
-    "rl.env": ("LunarHDAEnv", "LunarHDAMapEnv"),
-    "rl.policy": ("AgentPolicy", "AgentSite"),
+    "rl.environment.action": ("ActionRanges", "decide_action"),
+    "rl.environment.dispersions": ("Dispersions",),
+    "rl.environment.env": ("LunarHDAEnv", "LunarHDAMapEnv"),
+    "rl.inference.artefacts": ("ArtefactError",),
+    "rl.policies.actor": ("AgentPolicy", "AgentSite"),
 }
 
 __all__ = [
@@ -43,7 +43,7 @@ __getattr__, __dir__ = lazy_exports(
     __name__, {name: home for home, names in _HOMES.items() for name in names}
 )
 
-gymnasium.register("LunarHDA-v0", entry_point="rl.env:LunarHDAEnv")
-gymnasium.register("LunarHDA-Map-v0", entry_point="rl.env:LunarHDAMapEnv")
+gymnasium.register("LunarHDA-v0", entry_point="rl.environment.env:LunarHDAEnv")
+gymnasium.register("LunarHDA-Map-v0", entry_point="rl.environment.env:LunarHDAMapEnv")
 for _entry in entries():
     hda.register_policy(_entry)

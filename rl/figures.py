@@ -121,7 +121,7 @@ def draw_training(options: TrainingFigure) -> Figure:
     Raises:
         ValueError: the folder holds no log.
     """
-    from rl.run_folder import read_rows
+    from rl.training.run_folder import read_rows
 
     rows = read_rows(options.run / "training.csv")
     if not rows:
@@ -150,8 +150,8 @@ def draw_training(options: TrainingFigure) -> Figure:
 def draw_reconstruction(options: ReconstructionFigure) -> Figure:
     """Original looks above, reconstructions below, from the validation tiles."""
     from hda.task.presets import find_preset
-    from rl.autoencoder import autoencoder_from_tensors, collect_maps, reconstruct
-    from rl.latent import load_autoencoder
+    from rl.inference.latent import load_autoencoder
+    from rl.learning.autoencoder import autoencoder_from_tensors, collect_maps, reconstruct
 
     maps = collect_maps(find_preset(options.preset), "validation", options.columns, options.seed)
     maps = maps[(maps > 127).mean((1, 2)) > 0.02]  # some ground to see

@@ -17,9 +17,9 @@ from typing import Annotated
 import tyro
 
 from guidance.console import tolerate_encoding
-from rl.algorithms import RECIPES, RECURRENT_RECIPES, AgentSettings, RecurrentSettings
-from rl.export import ExportWeights, run_export
-from rl.train_autoencoder import TrainAutoencoder, run_autoencoder_training
+from rl.settings import RECIPES, RECURRENT_RECIPES, AgentSettings, RecurrentSettings
+from rl.training.export import ExportWeights, run_export
+from rl.training.train_autoencoder import TrainAutoencoder, run_autoencoder_training
 
 
 @dataclass(frozen=True)
@@ -93,8 +93,8 @@ def run_agent_training(options: TrainAgent, name: str) -> None:
     from guidance.validation import finite_number
     from hda.ground.library import Ground, prepare_tiles
     from hda.task.presets import find_preset
-    from rl.run_folder import TrainingPlan
-    from rl.training import run_training
+    from rl.training.run import run_training
+    from rl.training.run_folder import TrainingPlan
 
     for field in ("steps", "validate_every", "validation_episodes", "checkpoint_every"):
         finite_number(field, getattr(options, field), at_least=1)

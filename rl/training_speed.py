@@ -59,7 +59,7 @@ class UpdateRate:
 
 
 def _filled(kind: Any, options: TrainingSpeed, fused: bool) -> Any:
-    from rl.env import LunarHDAEnv
+    from rl.environment.env import LunarHDAEnv
 
     extra = {"optimizer_kwargs": {"fused": True}} if fused else {}
     model = kind(
@@ -85,7 +85,7 @@ def measure_training_speed(options: TrainingSpeed) -> dict[str, float]:
     import torch
     from stable_baselines3 import TD3
 
-    from rl.td3 import FastTD3
+    from rl.learning.td3 import FastTD3
 
     torch.set_num_threads(1)
     plain, fast = _filled(TD3, options, fused=False), _filled(FastTD3, options, fused=True)
@@ -111,9 +111,10 @@ def _filled_with_sequences(name: str, options: TrainingSpeed) -> Any:
     """An agent with memory whose replay memory holds random episodes of one length."""
     from dataclasses import replace
 
-    from rl.algorithms import RECURRENT_RECIPES, make_agent_with_memory
-    from rl.env import LunarHDAEnv
-    from rl.replay import Episode
+    from rl.environment.env import LunarHDAEnv
+    from rl.learning.algorithms import make_agent_with_memory
+    from rl.learning.recurrent.replay import Episode
+    from rl.settings import RECURRENT_RECIPES
 
     recipe = replace(RECURRENT_RECIPES[name], batch_size=options.sequences, memory=options.memory)
     agent = make_agent_with_memory(recipe, LunarHDAEnv(), 0)

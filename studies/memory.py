@@ -31,9 +31,9 @@ from rich.console import Console
 from guidance.console import tolerate_encoding
 from guidance.validation import finite_number, unknown_name
 from hda.task.presets import find_preset
-from rl.algorithms import RECIPES
-from rl.candidates import Choice
-from rl.policy import shipped, weights_name
+from rl.policies.actor import shipped, weights_name
+from rl.settings import RECIPES
+from rl.training.candidates import Choice
 from studies.command_line import one_line_errors, open_folder
 from studies.memory_answer import GroupRow, compare_groups, conclude
 from studies.memory_report import draw_memory, markdown, write_csv

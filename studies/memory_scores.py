@@ -9,8 +9,8 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from rl.candidates import Choice, best_of_run
-from rl.run_folder import read_rows, read_run
+from rl.training.candidates import Choice, best_of_run
+from rl.training.run_folder import read_rows, read_run
 
 VALIDATION_SEED = 0
 """Study seed of the one flight over the validation tiles, as of the cards of shipped weights."""
@@ -62,9 +62,9 @@ def score_run(folder: Path, episodes: int, choice: Choice, workers: int) -> Agen
     """
     from hda.ground.library import Ground, prepare_tiles
     from hda.task.presets import find_preset
-    from rl.actor_export import policy_of
-    from rl.algorithms import settings_from_json
-    from rl.scoring import score_policy
+    from rl.settings import settings_from_json
+    from rl.training.actor_export import policy_of
+    from rl.training.scoring import score_policy
 
     card = read_run(folder)
     preset, settings = find_preset(card["preset"]), settings_from_json(card["settings"])

@@ -34,7 +34,8 @@ class ConvexAnswer:
 
     Attributes:
         plan: the plan, or one without a flight.
-        lossy_flight: the relaxed flight, where it breaks min_thrust or the pointing limit; else None.
+        lossy_flight: the relaxed flight, where it breaks min_thrust or the pointing limit, or the bounds of an
+            engine that cannot stop; else None.
     """
 
     plan: Plan
@@ -117,7 +118,8 @@ def _finish(
     none = replace(none, solves=solves)
     if not _affordable(problem, solution):
         words = "feasible only with thrust bounds relaxed outward: on the edge of what the lander can do"
-        return ConvexAnswer(replace(none, status=PlanStatus.LIMIT_REACHED, message=words))
+        none = replace(none, status=PlanStatus.LIMIT_REACHED, message=words)
+        return ConvexAnswer(none, found.trajectory(problem) if problem.lander.min_thrust > 0.0 else None)
     if not relaxation_tight(problem, solution):
         words = "the relaxed optimum breaks min_thrust or the pointing limit"
         none = replace(none, status=PlanStatus.LIMIT_REACHED, message=words)

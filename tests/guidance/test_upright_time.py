@@ -49,7 +49,8 @@ def test_the_flight_keeps_the_limit_less_the_margin_and_a_shorter_one_does_not(s
     assume(chosen < 3.0 * quartic)
     assert follow(state, chosen)[0] <= 0.9 * limit + math.radians(0.2)
     if chosen > quartic:
-        assert follow(state, chosen - 0.03 * quartic)[0] > 0.9 * limit - math.radians(0.2)
+        # the law's steps are held, and its last instants are cut off: half a degree
+        assert follow(state, chosen - 0.03 * quartic)[0] > 0.9 * limit - math.radians(0.5)
 
 
 def test_a_tank_that_cannot_pay_for_the_upright_flight_gets_the_most_upright_that_it_can():

@@ -85,7 +85,7 @@ def test_other_unknown_names_have_no_word_of_agents():
 
 
 def test_the_names_of_agents_are_those_that_rl_registers():
-    from rl.catalogue import entries
+    from rl.policies.catalogue import entries
 
     assert sorted(registry.AGENTS) == sorted(entry.name for entry in entries())
 

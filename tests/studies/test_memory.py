@@ -14,11 +14,11 @@ import pytest
 from scipy.stats import ttest_ind
 
 from hda.task.presets import PRESETS
-from rl.algorithms import RECIPES
-from rl.artefacts import WEIGHTS_FOLDER
-from rl.candidates import Choice
-from rl.run_folder import TrainingPlan
-from rl.training import run_training
+from rl.inference.artefacts import WEIGHTS_FOLDER
+from rl.settings import RECIPES
+from rl.training.candidates import Choice
+from rl.training.run import run_training
+from rl.training.run_folder import TrainingPlan
 from studies.memory import MemoryStudy, PlannedRun, find_sources, planned_runs, study_memory
 from studies.memory_answer import compare_groups, conclude, welch_interval
 from studies.memory_scores import (

@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hda.policies.surroundings import safe_share_table
-from rl.artefacts import ArtefactError, card_digest, load_artefact, save_artefact
-from rl.policy import load_actor
-from rl.run_folder import read_rows, read_run
+from rl.inference.artefacts import ArtefactError, card_digest, load_artefact, save_artefact
+from rl.policies.actor import load_actor
+from rl.training.run_folder import read_rows, read_run
 from studies.monte_carlo import Chunk, Study, chunk_bounds
 from studies.rows import EpisodeRow
 from studies.shards import ShardError, read_shard, shard_path

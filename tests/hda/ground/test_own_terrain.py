@@ -360,7 +360,7 @@ def test_ground_without_enough_hazard_is_refused_after_bounded_tries(cache: Path
 
 
 def test_training_does_not_take_it(hazardous: Path) -> None:
-    from rl.env import EpisodeSource
+    from rl.environment.env import EpisodeSource
 
     preset = replace(PRESETS["paper"], terrain=open_own_terrain(hazardous))
     for split in ("train", "tuning"):

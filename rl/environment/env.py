@@ -1,0 +1,271 @@
+"""Gymnasium environments: one step is one decision, flown by the same functions as `hda.fly`."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import fields
+from typing import Any, Generic, TypeVar
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from hda.flight.episode import Flight, Step, advance, begin_flight, observe
+from hda.flight.outcome import Outcome
+from hda.task.observation import Observation
+from hda.task.presets import Preset, find_preset
+from hda.task.scenario import Scenario
+from rl.environment.action import PAPER_ACTIONS, ActionRanges, decide_action
+from rl.environment.dispersions import Dispersions
+from rl.environment.encoding import CURVED, LATENT_BOUND, LAYOUTS, Layout, encode_flight, encode_observation
+from rl.environment.episode_info import describe_episode
+from rl.environment.episode_source import EpisodeSource
+from rl.inference.latent import LATENT_SIZE
+
+ObsType = TypeVar("ObsType")
+_DISPERSION_NAMES = tuple(entry.name for entry in fields(Dispersions))
+_OPTIONS = ("scenario", *_DISPERSION_NAMES)
+
+
+class LandingEnv(gymnasium.Env[ObsType, NDArray[np.float32]], Generic[ObsType]):
+    """What the two environments share.
+
+    **Action**, Box(-1, 1, (5,), float32), linear between the ends:
+
+    | index | meaning | -1 | +1 |
+    |---|---|---|---|
+    | 0 | K_R, gain on the zero-effort miss | 5 | 7 |
+    | 1 | K_V, gain on the zero-effort velocity | 1 | 3 |
+    | 2 | fall of the time to go over the 5 s to the next look, s | 4.25 | 5.75 |
+    | 3 | alpha_x: the target moves east by alpha_x times the look's width | -0.25 | 0.25 |
+    | 4 | alpha_y: the target moves north by alpha_y times the look's width | -0.25 | 0.25 |
+
+    **Reward**: `hda.flight.outcome.score_step`; the paper's terms with the signs it means.
+
+    **Episode**: `terminated` at touchdown (or crash, or empty tank), `truncated` after `max_decisions` in
+    flight. `reset(seed=s)` flies episode 0 of the study s, each later `reset()` the next one: the same
+    episodes as `hda.sample_scenario(preset, s, episode, split)`. Without any seed the study is drawn at
+    random.
+
+    **Options** of `reset`: `scenario`, an `hda.Scenario` to fly instead; and every field of `Dispersions`
+    by name (`{"thrust_error": 0.0}`), for this episode only.
+
+    **Info** has these keys with these types at reset, at every step and at the end:
+
+    | key | type | meaning |
+    |---|---|---|
+    | `study_seed` | int | of the episode; -1 where it has more than 63 bits |
+    | `episode_number`, `tile` | int | within the study; of the split |
+    | `reward_terms` | dict of float | the step's, by name, each weighted and signed; 0 at reset |
+    | `target_distance` | float | m from the present target; at the end the miss distance |
+    | `speed` | float | m/s; at the end the touchdown speed |
+    | `propellant_fraction` | float | propellant burnt so far over that at the start |
+    | `pointing_limited` | int | control periods so far in which the lander's pointing limit acted |
+    | `ending` | int | 0 in flight, then `rl.environment.episode_info.ENDING_CODES`; 1 is a success |
+    | `is_success`, `safe_site` | bool | false in flight |
+
+    The objects behind them are `env.unwrapped.outcome` (None in flight), `.steps` and `.scenario`.
+
+    **Worker processes** that have not imported `rl` know the environments as `"rl:LunarHDA-v0"` and
+    `"rl:LunarHDA-Map-v0"`: Gymnasium imports what stands before the colon.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 2}  # noqa: RUF012 - Gymnasium declares it so
+
+    def __init__(
+        self,
+        preset: str | Preset = "paper",
+        split: str = "train",
+        dispersions: Dispersions | None = None,
+        action_ranges: ActionRanges = PAPER_ACTIONS,
+        render_mode: str | None = None,
+    ) -> None:
+        """Make the environment; terrain is loaded at the first reset.
+
+        Raises:
+            ValueError: unknown preset or render mode, or a split that the preset's terrain does not have.
+        """
+        if render_mode not in (None, "rgb_array"):
+            raise ValueError(f"render_mode must be None or 'rgb_array', got {render_mode!r}")
+        self.source = EpisodeSource(find_preset(preset), split, dispersions or Dispersions())
+        self.action_ranges = action_ranges
+        self.render_mode = render_mode
+        self.action_space = spaces.Box(-1.0, 1.0, (5,), np.float32)
+        self.study_seed: int | None = None
+        self.next_episode = 0
+        self.scenario: Scenario | None = None
+        self.steps: list[Step] = []
+        self._flight: Flight | None = None
+        self._observation: Observation | None = None
+
+    @abstractmethod
+    def encode(self, observation: Observation, nominal_target: NDArray[np.float64]) -> ObsType:
+        """Turn an observation into a new element of the observation space."""
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[ObsType, dict[str, Any]]:
+        """Begin an episode.
+
+        Raises:
+            ValueError: an unknown option.
+        """
+        super().reset(seed=seed)
+        chosen = dict(options or {})
+        unknown = sorted(set(chosen) - set(_OPTIONS))
+        if unknown:
+            raise ValueError(f"options must be among {', '.join(_OPTIONS)}, got {', '.join(unknown)}")
+        if seed is not None or self.study_seed is None:
+            self.study_seed = int(self.np_random.integers(2**31)) if seed is None else seed
+            self.next_episode = 0
+        scenario = chosen.pop("scenario", None)
+        if scenario is None:
+            scenario = self.source.scenario(self.study_seed, self.next_episode, chosen)
+            self.next_episode += 1
+        elif not isinstance(scenario, Scenario):
+            raise ValueError(f"options['scenario'] must be an hda.Scenario, got {type(scenario).__name__}")
+        elif chosen:
+            raise ValueError(f"a given scenario keeps its dispersions; got also {', '.join(sorted(chosen))}")
+        self.scenario = scenario
+        self.steps = []
+        return self._look(begin_flight(scenario))
+
+    def step(self, action: NDArray[np.float32]) -> tuple[ObsType, float, bool, bool, dict[str, Any]]:
+        """Fly one decision.
+
+        Raises:
+            ValueError: the action is not five finite numbers.
+            gymnasium.error.ResetNeeded: no episode is under way.
+        """
+        scenario, flight, look = self.scenario, self._flight, self._observation
+        if scenario is None or flight is None or look is None or self.outcome:
+            raise gymnasium.error.ResetNeeded("the episode is over or has not begun: call reset()")
+        step = advance(scenario, flight, decide_action(action, look, self.action_ranges))
+        self.steps.append(step)
+        terminated = step.outcome is not None and not step.truncated
+        seen, info = self._look(step.flight)
+        return seen, step.reward.total, terminated, step.truncated, info
+
+    @property
+    def outcome(self) -> Outcome | None:
+        """How the episode ended; None while it goes on."""
+        return self.steps[-1].outcome if self.steps else None
+
+    def continue_study(self, study_seed: int, next_episode: int) -> None:
+        """Let the next `reset()` without a seed fly this episode of this study."""
+        self.study_seed, self.next_episode = study_seed, next_episode
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """Picture of the ground, the path and the field of view, shape (rows, columns, 3); or None.
+
+        Raises:
+            gymnasium.error.ResetNeeded: no episode has begun.
+        """
+        if self.render_mode is None:
+            return None
+        if self.scenario is None or self._observation is None:
+            raise gymnasium.error.ResetNeeded("nothing to render: call reset()")
+        from rl.environment.rendering import render_flight
+
+        return render_flight(self.scenario, self.steps, self._observation)
+
+    def _look(self, flight: Flight) -> tuple[ObsType, dict[str, Any]]:
+        """Take the look of this instant: the encoded observation, and the episode's numbers."""
+        assert self.scenario is not None
+        self._flight = flight
+        self._observation = observe(self.scenario, flight)
+        seen = self.encode(self._observation, self.scenario.nominal_target)
+        return seen, describe_episode(self.scenario, flight, self.steps)
+
+
+class LunarHDAEnv(LandingEnv[NDArray[np.float32]]):
+    """`LunarHDA-v0`: the 44 numbers that the agents see; float32, clipped to finite bounds.
+
+    x = (value - center) / scale; where "curved", asinh(x) / 2: fine near the ground and coarse above.
+
+    | index | meaning | center | scale | |
+    |---|---|---|---|---|
+    | 0, 1 | position east, north of the current target, m | 0 | 5 | curved |
+    | 2 | height above the target, m | 0 | 5 | curved |
+    | 3, 4, 5 | velocity east, north, up, m/s | 0 | 2 | curved |
+    | 6 | mass, kg | 1175 | 25 | |
+    | 7 | width of the look, m | 0 | 2 | curved |
+    | 8 | time to go, s | 0 | 1 | curved |
+    | 9, 10 | current target east, north of the first one, m | 0 | 100 | |
+    | 11 | current target above the first one, m: always 0 | 0 | 100 | |
+    | 12-43 | latent of the safety map, about normal over random rollouts | 0 | 1 | |
+
+    Bounds are -8 to 8, for height and width -1 to 8. `layout="relative"` has the same elements without
+    curves, on the scales in `rl.environment.encoding`; `layout="printed"` has elements 0-11 as the paper
+    prints them: position, velocity, mass, width twice, target. Rewards, actions and options: `LandingEnv`.
+    """
+
+    def __init__(
+        self,
+        preset: str | Preset = "paper",
+        split: str = "train",
+        dispersions: Dispersions | None = None,
+        action_ranges: ActionRanges = PAPER_ACTIONS,
+        render_mode: str | None = None,
+        layout: str = CURVED.name,
+    ) -> None:
+        """Make the environment; the shipped map encoder is loaded.
+
+        Raises:
+            ValueError: unknown preset, split, layout or render mode.
+            ArtefactError: the encoder's weights are missing or damaged.
+        """
+        from rl.inference.latent import load_encoder
+
+        super().__init__(preset, split, dispersions, action_ranges, render_mode)
+        if layout not in LAYOUTS:
+            raise ValueError(f"layout must be one of {', '.join(LAYOUTS)}, got {layout!r}")
+        self.layout: Layout = LAYOUTS[layout]
+        self._encoder = load_encoder()
+        bound = np.full(LATENT_SIZE, LATENT_BOUND, np.float32)
+        low, high = np.concatenate([self.layout.low, -bound]), np.concatenate([self.layout.high, bound])
+        self.observation_space = spaces.Box(low, high, dtype=np.float32)
+
+    def encode(self, observation: Observation, nominal_target: NDArray[np.float64]) -> NDArray[np.float32]:
+        """The 44 numbers."""
+        latent = self._encoder.encode(observation.safety_map)
+        return encode_observation(self.layout, observation, nominal_target, latent)
+
+
+class LunarHDAMapEnv(LandingEnv[dict[str, Any]]):
+    """`LunarHDA-Map-v0`: the flight and the raw map, for networks that read the map themselves.
+
+    - `flight`: float32, shape (12,), elements 0-11 of `LunarHDA-v0`;
+    - `map`: uint8, shape (1, 64, 64), the observed safety times 255 (far finer than the sensor's noise);
+      channel first, row i grows north, column j east, centred on the current target.
+
+    Rewards, actions and options: `LandingEnv`.
+    """
+
+    def __init__(
+        self,
+        preset: str | Preset = "paper",
+        split: str = "train",
+        dispersions: Dispersions | None = None,
+        action_ranges: ActionRanges = PAPER_ACTIONS,
+        render_mode: str | None = None,
+    ) -> None:
+        """Make the environment.
+
+        Raises:
+            ValueError: unknown preset, split or render mode.
+        """
+        super().__init__(preset, split, dispersions, action_ranges, render_mode)
+        pixels = find_preset(preset).lidar.pixels
+        self.observation_space = spaces.Dict(
+            flight=spaces.Box(CURVED.low, CURVED.high, dtype=np.float32),
+            map=spaces.Box(0, 255, (1, pixels, pixels), np.uint8),
+        )
+
+    def encode(self, observation: Observation, nominal_target: NDArray[np.float64]) -> dict[str, Any]:
+        """The flight and the map."""
+        return {
+            "flight": encode_flight(CURVED, observation, nominal_target),
+            "map": np.round(observation.safety_map[None] * 255.0).astype(np.uint8),
+        }

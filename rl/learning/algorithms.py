@@ -1,0 +1,88 @@
+"""The learning algorithms by name, and the settings that they are trained with here."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rl.environment.action import CONTROLS
+from rl.settings import AgentSettings, RecurrentSettings
+
+if TYPE_CHECKING:
+    from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
+
+    from rl.learning.recurrent.td3_lstm import RecurrentTD3
+
+
+def make_agent_with_memory(settings: RecurrentSettings, env: Any, seed: int) -> RecurrentTD3:
+    """Make an untrained agent with memory."""
+    from rl.learning.recurrent.hyperparameters import Hyperparameters
+    from rl.learning.recurrent.td3_lstm import RecurrentTD3
+
+    names = ("memory", "batch_size", "discount", "target_rate", "random_steps", "update_every")
+    names += ("replay_size", "window", "burn_in", "exploration_noise", "smoothing_noise")
+    chosen = {name: getattr(settings, name) for name in names}
+    hyperparameters = Hyperparameters(
+        plus=settings.algorithm == "td3-lstm-plus", head=settings.hidden, **chosen
+    )
+    agent = RecurrentTD3(env, hyperparameters, seed, settings.learning_rate_at)
+    controls = (np.arange(agent.sizes.action) < CONTROLS).astype(np.float32)
+    agent.action_prior = lambda step: settings.control_prior_at(step) * controls
+    return agent
+
+
+def make_algorithm(settings: AgentSettings, env: Any, seed: int) -> OffPolicyAlgorithm | RecurrentTD3:
+    """Make an untrained algorithm.
+
+    Args:
+        settings: what is learnt.
+        env: Gymnasium environment.
+        seed: of the first weights, the exploration and the episodes.
+
+    Raises:
+        ValueError: unknown algorithm, or spaces that are not one-dimensional boxes, finite for actions.
+        ImportError: `tqc` without sb3-contrib.
+    """
+    from rl.learning.box_spaces import check_environment
+
+    check_environment(env)
+    if isinstance(settings, RecurrentSettings):
+        return make_agent_with_memory(settings, env, seed)
+    from stable_baselines3 import DDPG, SAC
+    from stable_baselines3.common.noise import NormalActionNoise
+
+    from rl.learning.td3 import FastTD3
+
+    classes: dict[str, Any] = {"td3": FastTD3, "ddpg": DDPG, "sac": SAC}
+    if settings.algorithm == "tqc":
+        from sb3_contrib import TQC
+
+        classes["tqc"] = TQC
+    if settings.algorithm not in classes:
+        raise ValueError(f"algorithm must be td3, sac, ddpg or tqc, got {settings.algorithm!r}")
+    algorithm: OffPolicyAlgorithm = classes[settings.algorithm](
+        "MlpPolicy",
+        env,
+        learning_rate=settings.learning_rate,
+        buffer_size=settings.replay_size,
+        learning_starts=settings.random_steps,
+        batch_size=settings.batch_size,
+        tau=settings.target_rate,
+        gamma=settings.discount,
+        train_freq=1,
+        gradient_steps=1,
+        policy_kwargs={"net_arch": list(settings.hidden), "optimizer_kwargs": {"fused": True}},
+        seed=seed,
+        device="cpu",
+    )
+    # decays follow the step and not SB3's share of the total, so that a longer run begins as a shorter one
+    algorithm.lr_schedule = lambda _: settings.learning_rate_at(algorithm.num_timesteps)
+    if isinstance(algorithm, FastTD3):
+        algorithm.control_prior = lambda: settings.control_prior_at(algorithm.num_timesteps)
+        algorithm.target_policy_noise = settings.smoothing_noise
+        algorithm.target_noise_clip = 2.5 * settings.smoothing_noise
+    if settings.algorithm in ("td3", "ddpg"):
+        still = np.zeros(env.action_space.shape)
+        algorithm.action_noise = NormalActionNoise(still, still + settings.exploration_noise)
+    return algorithm

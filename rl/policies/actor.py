@@ -1,0 +1,181 @@
+"""The trained agents as policies: an encoder and a small network; torch is not needed to fly."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hda.policy import Decision
+from hda.task.observation import Observation, ScenarioView
+from hda.task.rules import Range
+from rl.environment.action import PAPER_ACTIONS, ActionRanges, decide_action
+from rl.environment.encoding import ENCODING_VERSION, LAYOUTS, Layout, encode_observation
+from rl.inference.artefacts import WEIGHTS_FOLDER, Artefact, ArtefactError, load_artefact, require
+from rl.inference.latent import LATENT_SIZE, load_autoencoder, load_encoder
+from rl.inference.networks import MapEncoder, Perceptron
+
+
+@dataclass(frozen=True, eq=False)
+class Actor:
+    """Observation -> action: the deterministic part of an agent without memory.
+
+    Attributes:
+        layout: observation vector that it was trained on.
+        encoder: makes the latent of a map.
+        network: its dense layers; tanh follows.
+        ranges: what its actions mean.
+    """
+
+    layout: Layout
+    encoder: MapEncoder
+    network: Perceptron
+    ranges: ActionRanges = PAPER_ACTIONS
+
+    def act(self, observation: Observation, nominal_target: NDArray[np.float64]) -> NDArray[np.float32]:
+        """Action of shape (5,) in [-1, 1]."""
+        latent = self.encoder.encode(observation.safety_map)
+        vector = encode_observation(self.layout, observation, nominal_target, latent)
+        return np.tanh(self.network.evaluate(vector))
+
+    def decide(self, observation: Observation, nominal_target: NDArray[np.float64]) -> Decision:
+        """Decision of the action."""
+        return decide_action(self.act(observation, nominal_target), observation, self.ranges)
+
+
+def read_actor_card(card: dict[str, Any], path: Path) -> tuple[Layout, list[int], ActionRanges]:
+    """Layout, sizes of the hidden layers and action ranges of an actor's card.
+
+    Raises:
+        ArtefactError: it was made for another encoding or autoencoder, or a field is wrong.
+    """
+    require(card, "encoding_version", ENCODING_VERSION, path)
+    require(card, "autoencoder", load_autoencoder().digest, path)
+    if not isinstance(card.get("layout"), str) or card["layout"] not in LAYOUTS:
+        raise ArtefactError(f"{path}: unknown layout {card.get('layout')!r}")
+    try:
+        hidden = [int(size) for size in card["hidden"]]
+        ranges = action_ranges_from_card(card["action_ranges"])
+    except (KeyError, TypeError, ValueError) as error:
+        raise ArtefactError(f"{path}: the card's 'hidden' or 'action_ranges' is wrong: {error}") from error
+    return LAYOUTS[card["layout"]], hidden, ranges
+
+
+def actor_from_artefact(artefact: Artefact, path: Path) -> Actor:
+    """Make an actor from verified weights.
+
+    Raises:
+        ArtefactError: they were made for another encoding, another autoencoder, or have other shapes.
+    """
+    layout, hidden, ranges = read_actor_card(artefact.card, path)
+    sizes = (len(layout.elements) + LATENT_SIZE, *hidden, 5)
+    return Actor(layout, load_encoder(), Perceptron.from_tensors(artefact.tensors, sizes), ranges)
+
+
+def action_ranges_from_card(card: dict[str, object]) -> ActionRanges:
+    """Undo `dataclasses.asdict` on ActionRanges."""
+    values = {name: Range(**value) if isinstance(value, dict) else value for name, value in card.items()}
+    return ActionRanges(**values)  # type: ignore[arg-type]
+
+
+@cache
+def load_actor(path: Path) -> Actor:
+    """Read, verify and make an actor; once per process.
+
+    Raises:
+        ArtefactError: the weights are missing, damaged, changed, or made for another version.
+    """
+    return actor_from_artefact(load_artefact(path, "actor"), path)
+
+
+@dataclass(frozen=True)
+class AgentPolicy:
+    """The agent as the paper flies it: it moves the target, the gains and the time to go.
+
+    Attributes:
+        name: name in tables.
+        weights: file name without suffix; read when the policy first flies.
+    """
+
+    name: str
+    weights: Path
+
+    def begin(self, scenario_view: ScenarioView, rng: np.random.Generator) -> NDArray[np.float64]:
+        """Read the weights, remember the first target.
+
+        Raises:
+            ArtefactError: the weights are missing, damaged or foreign.
+        """
+        load_actor(self.weights)
+        return scenario_view.nominal_target
+
+    def decide(
+        self, observation: Observation, memory: NDArray[np.float64]
+    ) -> tuple[Decision, NDArray[np.float64]]:
+        """Decide from this observation alone."""
+        return load_actor(self.weights).decide(observation, memory), memory
+
+
+@dataclass(frozen=True)
+class ActorPolicy:
+    """An actor in memory as a policy, for validation during training.
+
+    Attributes:
+        name: name in tables.
+        actor: the network.
+    """
+
+    name: str
+    actor: Actor = field(repr=False)
+
+    def begin(self, scenario_view: ScenarioView, rng: np.random.Generator) -> NDArray[np.float64]:
+        """Remember the first target."""
+        return scenario_view.nominal_target
+
+    def decide(
+        self, observation: Observation, memory: NDArray[np.float64]
+    ) -> tuple[Decision, NDArray[np.float64]]:
+        """Decide from this observation alone."""
+        return self.actor.decide(observation, memory), memory
+
+
+@dataclass(frozen=True)
+class AgentSite:
+    """The agent as a site selection: only where it moves the target counts, its gains are ignored.
+
+    With `FixedGainZemZev` this is the paper's Fixed Control.
+
+    Attributes:
+        weights: file name without suffix; read when the policy first flies.
+    """
+
+    weights: Path
+
+    def begin(self, view: ScenarioView) -> NDArray[np.float64]:
+        """Read the weights, remember the first target.
+
+        Raises:
+            ArtefactError: the weights are missing, damaged or foreign.
+        """
+        load_actor(self.weights)
+        return view.nominal_target
+
+    def select(
+        self, observation: Observation, memory: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Site of the agent's decision."""
+        return load_actor(self.weights).decide(observation, memory).site, memory
+
+
+def weights_name(agent: str, preset: str) -> str:
+    """Name of shipped weights; those that were trained on `paper` go by the agent's own."""
+    return agent if preset == "paper" else f"{agent}-{preset}"
+
+
+def shipped(name: str) -> Path:
+    """Path of shipped weights, without suffix."""
+    return WEIGHTS_FOLDER / name

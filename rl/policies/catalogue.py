@@ -1,0 +1,65 @@
+"""The trained agents by name, as far as their weights are shipped."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from hda.policies.adjusted_descent import AdjustedDescent
+from hda.policies.composition import ComposedPolicy
+from hda.policies.entry import PolicyEntry
+from hda.policies.zem_zev import FixedGainZemZev
+from rl.policies.actor import AgentPolicy, AgentSite, shipped, weights_name
+from rl.policies.recurrent_actor import RecurrentAgentPolicy
+from rl.settings import WITH_MEMORY
+
+_AGENTS = {
+    "td3": "the paper's agent without memory: moves the target, the gains and the time to go",
+    "sac": "the same agent trained with soft actor-critic",
+    "td3-lstm": "the paper's agent with memory: TD3 with LSTM, Algorithm 3",
+    "td3-lstm-plus": "the same with one masked memory, the last reward in the history, an encoder per role",
+    "td3-paper": "the plain recipe: the printed observation vector, TD3 as its authors published it",
+}
+
+
+def _agent(agent: str, preset: str = "paper") -> PolicyEntry:
+    """An agent as it was trained on a preset; that of `paper` belongs in every table."""
+    name, summary = weights_name(agent, preset), _AGENTS[agent]
+    kind = RecurrentAgentPolicy if agent in WITH_MEMORY else AgentPolicy
+    entry = PolicyEntry(name, lambda: kind(name, shipped(name)), summary)
+    if preset == "paper":
+        return entry
+    return replace(entry, summary=f"{summary}; trained on {preset}", preset=preset)
+
+
+_ENTRIES = (
+    ("td3", _agent("td3")),
+    (
+        "td3",
+        PolicyEntry(
+            "td3-fixed-gain",
+            lambda: ComposedPolicy("td3-fixed-gain", AgentSite(shipped("td3")), FixedGainZemZev()),
+            "the paper's Fixed Control: the sites of td3, gains 6/2, time to go of the quartic",
+        ),
+    ),
+    (
+        "td3",
+        PolicyEntry(
+            "td3+convex",
+            lambda: ComposedPolicy("td3+convex", AgentSite(shipped("td3")), AdjustedDescent()),
+            "the sites of td3, flown by convex guidance",
+        ),
+    ),
+    ("sac", _agent("sac")),
+    ("td3-lstm", _agent("td3-lstm")),
+    ("td3-lstm-plus", _agent("td3-lstm-plus")),
+    ("td3-paper", _agent("td3-paper")),
+    *(
+        (weights_name(agent, "partial"), _agent(agent, "partial"))
+        for agent in ("td3", "td3-lstm", "td3-lstm-plus")
+    ),
+)
+
+
+def entries() -> tuple[PolicyEntry, ...]:
+    """Registry lines of the agents whose weight cards are there; the weights are verified in flight."""
+    return tuple(entry for weights, entry in _ENTRIES if shipped(weights).with_suffix(".json").exists())

@@ -1,0 +1,161 @@
+"""The agents with memory as policies: memory goes in and comes out; torch is not needed to fly."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hda.flight.outcome import score_step
+from hda.policy import Decision
+from hda.task.observation import Observation, ScenarioView
+from rl.environment.action import PAPER_ACTIONS, ActionRanges, decide_action
+from rl.environment.encoding import Layout, encode_observation
+from rl.inference.artefacts import Artefact, ArtefactError, load_artefact
+from rl.inference.latent import LATENT_SIZE, load_encoder
+from rl.inference.networks import MapEncoder
+from rl.inference.recurrent_network import RecurrentNetwork
+from rl.policies.actor import read_actor_card
+
+Array = NDArray[np.float32]
+
+
+@dataclass(frozen=True, eq=False)
+class FlightMemory:
+    """What an agent with memory carries from one decision to the next.
+
+    Attributes:
+        nominal_target: [m] shape (3,), first target of the episode.
+        dry_mass: [kg] of the lander.
+        hidden: shape (memory,), h of the LSTM.
+        cell: shape (memory,), c of the LSTM.
+        action: shape (5,), last action; 0 before the first.
+        first_mass: [kg] at the first decision; None before it.
+        mass: [kg] at the last decision; None before the first.
+    """
+
+    nominal_target: NDArray[np.float64]
+    dry_mass: float
+    hidden: Array
+    cell: Array
+    action: Array
+    first_mass: float | None = None
+    mass: float | None = None
+
+    def reward(self, mass: float) -> float:
+        """Reward of the interval that led here: in flight it is the propellant burnt alone."""
+        if self.mass is None or self.first_mass is None:
+            return 0.0
+        return score_step((self.mass - mass) / (self.first_mass - self.dry_mass), None).total
+
+
+@dataclass(frozen=True, eq=False)
+class MemoryActor:
+    """Observation and memory -> action and memory.
+
+    Attributes:
+        layout: observation vector that it was trained on.
+        encoder: makes the latent of a map.
+        network: LSTM and dense layers; tanh follows.
+        ranges: what its actions mean.
+    """
+
+    layout: Layout
+    encoder: MapEncoder
+    network: RecurrentNetwork
+    ranges: ActionRanges = PAPER_ACTIONS
+
+    def begin(self, view: ScenarioView) -> FlightMemory:
+        """Nothing remembered."""
+        zero = np.zeros(self.network.memory, np.float32)
+        return FlightMemory(view.nominal_target, view.lander.dry_mass, zero, zero, np.zeros(5, np.float32))
+
+    def decide(self, observation: Observation, memory: FlightMemory) -> tuple[Decision, FlightMemory]:
+        """Decide, and remember."""
+        latent = self.encoder.encode(observation.safety_map)
+        vector = encode_observation(self.layout, observation, memory.nominal_target, latent)
+        mass = observation.state.mass
+        parts = [vector, memory.action]
+        if self.network.previous_reward:
+            parts.append(np.array([memory.reward(mass)], np.float32))
+        inputs, hidden, cell = self.network.evaluate(
+            vector, np.concatenate(parts), (memory.hidden, memory.cell)
+        )
+        action = np.tanh(inputs)
+        first = mass if memory.first_mass is None else memory.first_mass
+        after = FlightMemory(memory.nominal_target, memory.dry_mass, hidden, cell, action, first, mass)
+        return decide_action(action, observation, self.ranges), after
+
+
+def memory_actor_from_artefact(artefact: Artefact, path: Path) -> MemoryActor:
+    """Make an actor with memory from verified weights.
+
+    Raises:
+        ArtefactError: they were made for another encoding, another autoencoder, or have other shapes.
+    """
+    layout, hidden, ranges = read_actor_card(artefact.card, path)
+    memory = artefact.card.get("memory")
+    if not isinstance(memory, int):
+        raise ArtefactError(f"{path}: the card's 'memory' must be a whole number, got {memory!r}")
+    size, reward = len(layout.elements) + LATENT_SIZE, artefact.card.get("algorithm") == "td3-lstm-plus"
+    network = RecurrentNetwork.from_tensors(artefact.tensors, size, memory, hidden, reward)
+    return MemoryActor(layout, load_encoder(), network, ranges)
+
+
+@cache
+def load_memory_actor(path: Path) -> MemoryActor:
+    """Read, verify and make an actor with memory; once per process.
+
+    Raises:
+        ArtefactError: the weights are missing, damaged, changed, or made for another version.
+    """
+    return memory_actor_from_artefact(load_artefact(path, "actor"), path)
+
+
+@dataclass(frozen=True)
+class RecurrentAgentPolicy:
+    """The agent with memory as the paper flies it: it moves the target, the gains and the time to go.
+
+    Attributes:
+        name: name in tables.
+        weights: file name without suffix; read when the policy first flies.
+    """
+
+    name: str
+    weights: Path
+
+    def begin(self, scenario_view: ScenarioView, rng: np.random.Generator) -> FlightMemory:
+        """Read the weights; nothing is remembered yet.
+
+        Raises:
+            ArtefactError: the weights are missing, damaged or foreign.
+        """
+        return load_memory_actor(self.weights).begin(scenario_view)
+
+    def decide(self, observation: Observation, memory: FlightMemory) -> tuple[Decision, FlightMemory]:
+        """Decide from this observation and what is remembered."""
+        return load_memory_actor(self.weights).decide(observation, memory)
+
+
+@dataclass(frozen=True)
+class RecurrentActorPolicy:
+    """An actor with memory as a policy, for validation during training.
+
+    Attributes:
+        name: name in tables.
+        actor: the network.
+    """
+
+    name: str
+    actor: MemoryActor = field(repr=False)
+
+    def begin(self, scenario_view: ScenarioView, rng: np.random.Generator) -> FlightMemory:
+        """Nothing is remembered yet."""
+        return self.actor.begin(scenario_view)
+
+    def decide(self, observation: Observation, memory: FlightMemory) -> tuple[Decision, FlightMemory]:
+        """Decide from this observation and what is remembered."""
+        return self.actor.decide(observation, memory)

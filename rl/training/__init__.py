@@ -1,0 +1,26 @@
+"""A training run: its folder, checkpoints and scores, the choice of its best actor, its export.
+
+`rl.train` is its command. A run resumes to the same bits. It imports everything else of `rl`.
+"""
+
+from typing import TYPE_CHECKING
+
+from guidance.exports import lazy_exports
+
+if TYPE_CHECKING:
+    from rl.training.run import run_training
+    from rl.training.run_folder import TrainingPlan
+
+_HOMES = {
+    "rl.training.run": ("run_training",),
+    "rl.training.run_folder": ("TrainingPlan",),
+}
+
+__all__ = [
+    "TrainingPlan",
+    "run_training",
+]
+
+__getattr__, __dir__ = lazy_exports(
+    __name__, {name: home for home, names in _HOMES.items() for name in names}
+)

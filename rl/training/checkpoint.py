@@ -1,0 +1,201 @@
+"""Checkpoints of a training run that resume exactly: our own arrays and JSON, none of SB3's pickles.
+
+Taken between two episodes: networks, targets, optimisers, replay memory, the state of every random
+generator, and counters. What SB3 itself names as its torch state is what is kept, so that every off-policy
+algorithm of it works.
+"""
+
+from __future__ import annotations
+
+import re
+from contextlib import suppress
+from operator import attrgetter
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import torch
+
+from rl.inference.artefacts import Artefact, ArtefactError, Tensors, load_artefact, read_card, save_artefact
+from rl.learning.recurrent.td3_lstm import RecurrentTD3
+
+if TYPE_CHECKING:
+    from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
+
+    from rl.environment.env import LunarHDAEnv
+
+    Algorithm = OffPolicyAlgorithm | RecurrentTD3
+
+KIND = "checkpoint"
+_REPLAY = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
+
+
+def save_checkpoint(folder: Path, algorithm: Algorithm, env: LunarHDAEnv, card: dict[str, Any]) -> Path:
+    """Write a checkpoint and remove older ones.
+
+    Args:
+        folder: of the run.
+        algorithm: between two episodes: its last step ended one.
+        env: the environment that it trains on, already reset for the next episode.
+        card: settings and whatever else the run wants back.
+
+    Returns:
+        Path of the checkpoint, without suffix.
+    """
+    path = folder / f"checkpoint-{algorithm.num_timesteps:09d}"
+    generators = {
+        "numpy": _numpy_state(),
+        "action_space": _jsonable(algorithm.action_space.np_random.bit_generator.state),
+    }
+    if isinstance(algorithm, RecurrentTD3):
+        generators["agent"] = _jsonable(algorithm.rng.bit_generator.state)
+    counters = {
+        "num_timesteps": algorithm.num_timesteps,
+        "n_updates": algorithm._n_updates,
+        "episode_num": algorithm._episode_num,
+        "study_seed": env.study_seed,
+        # the environment has begun the next episode already; the resumed run begins it again
+        "next_episode": env.next_episode - 1,
+    }
+    tensors = {**_network_tensors(algorithm), **_replay_tensors(algorithm)}
+    tensors["generator/torch"] = torch.get_rng_state().numpy()
+    save_artefact(path, KIND, tensors, {**card, "generators": generators, "counters": counters})
+    for old in folder.glob("checkpoint-*"):
+        if old.stem != path.name:
+            old.unlink()
+    return path
+
+
+def newest_checkpoint(folder: Path) -> Path | None:
+    """Path (without suffix) of the newest checkpoint whose card is complete, or None."""
+    for card in sorted(folder.glob("checkpoint-*.json"), reverse=True):
+        with suppress(ArtefactError):
+            read_card(card, KIND)
+            return card.with_suffix("")
+    return None
+
+
+def restore_checkpoint(path: Path, algorithm: Algorithm, env: LunarHDAEnv) -> dict[str, Any]:
+    """Put a fresh algorithm and environment where the checkpoint was taken.
+
+    Args:
+        path: of the checkpoint, without suffix.
+        algorithm: made with the same settings; everything that learns is overwritten.
+        env: the environment inside it.
+
+    Returns:
+        The checkpoint's card.
+
+    Raises:
+        ArtefactError: the checkpoint is damaged or does not fit the algorithm.
+    """
+    artefact = load_artefact(path, KIND)
+    try:
+        _restore_run(artefact, algorithm, env)
+    except (AssertionError, IndexError, KeyError, TypeError, ValueError, RuntimeError) as error:
+        raise ArtefactError(f"{path} does not fit this algorithm: {error!r}") from error
+    return artefact.card
+
+
+def _restore_run(artefact: Artefact, algorithm: Algorithm, env: LunarHDAEnv) -> None:
+    counters, generators = artefact.card["counters"], artefact.card["generators"]
+    algorithm.num_timesteps = counters["num_timesteps"]
+    algorithm._n_updates = counters["n_updates"]
+    algorithm._episode_num = counters["episode_num"]
+    env.continue_study(counters["study_seed"], counters["next_episode"])
+    _begin_episode(algorithm)
+    _restore_networks(algorithm, artefact.tensors)
+    _restore_replay(algorithm, artefact.tensors)
+    algorithm.action_space.np_random.bit_generator.state = generators["action_space"]
+    if isinstance(algorithm, RecurrentTD3):
+        algorithm.rng.bit_generator.state = generators["agent"]
+    name, keys, *rest = generators["numpy"]
+    np.random.set_state((name, np.array(keys, dtype=np.uint32), *rest))  # noqa: NPY002 - SB3 draws from it
+    torch.set_rng_state(torch.from_numpy(artefact.tensors["generator/torch"].copy()))
+
+
+def _begin_episode(algorithm: Algorithm) -> None:
+    if isinstance(algorithm, RecurrentTD3):
+        algorithm.restart_episode()
+        return
+    vectorized = algorithm.get_env()
+    assert vectorized is not None
+    vectorized._reset_seeds()
+    algorithm._last_obs = vectorized.reset()  # type: ignore[assignment]
+
+
+def _numpy_state() -> list[Any]:
+    name, keys, *rest = np.random.get_state()  # noqa: NPY002 - SB3 draws from it
+    return [name, [int(key) for key in keys], *rest]
+
+
+def _jsonable(state: Any) -> Any:
+    if isinstance(state, dict):
+        return {key: _jsonable(value) for key, value in state.items()}
+    return state if isinstance(state, str) else int(state)
+
+
+def _network_tensors(algorithm: Algorithm) -> Tensors:
+    modules, variables = algorithm._get_torch_save_params()
+    tensors: Tensors = {}
+    for name in modules:
+        state = attrgetter(name)(algorithm).state_dict()
+        if "param_groups" in state:  # an optimiser
+            for index, moments in state["state"].items():
+                for key, value in moments.items():
+                    tensors[f"{name}/{index}/{key}"] = value.numpy()
+        else:
+            tensors.update({f"{name}/{key}": value.numpy() for key, value in state.items()})
+    for name in variables:
+        tensors[f"variable/{name}"] = attrgetter(name)(algorithm).detach().numpy()
+    return tensors
+
+
+def _restore_networks(algorithm: Algorithm, tensors: Tensors) -> None:
+    modules, variables = algorithm._get_torch_save_params()
+    for name in modules:
+        module = attrgetter(name)(algorithm)
+        own = {
+            key.removeprefix(f"{name}/"): torch.tensor(value)
+            for key, value in tensors.items()
+            if key.startswith(f"{name}/")
+        }
+        if isinstance(module, torch.optim.Optimizer):
+            state: dict[int, dict[str, torch.Tensor]] = {}
+            for key, value in own.items():
+                match = re.fullmatch(r"(\d+)/(\w+)", key)
+                if match is None:
+                    raise ValueError(f"optimiser state {name}/{key} is not of Adam")
+                state.setdefault(int(match[1]), {})[match[2]] = value
+            module.load_state_dict({"state": state, "param_groups": module.state_dict()["param_groups"]})
+        else:
+            module.load_state_dict(own)
+    for name in variables:
+        attrgetter(name)(algorithm).data.copy_(torch.tensor(tensors[f"variable/{name}"]))
+
+
+def _replay_tensors(algorithm: Algorithm) -> Tensors:
+    if isinstance(algorithm, RecurrentTD3):
+        return {f"replay/{name}": array for name, array in algorithm.replay_buffer.tensors().items()}
+    replay: Any = algorithm.replay_buffer
+    size = replay.size()
+    tensors: Tensors = {f"replay/{name}": getattr(replay, name)[:size] for name in _REPLAY}
+    tensors["replay/position"] = np.array([replay.pos, int(replay.full)])
+    return tensors
+
+
+def _restore_replay(algorithm: Algorithm, tensors: Tensors) -> None:
+    if isinstance(algorithm, RecurrentTD3):
+        kept = {name: tensors[f"replay/{name}"] for name in algorithm.replay_buffer.tensors()}
+        algorithm.replay_buffer.restore(kept)
+        return
+    replay: Any = algorithm.replay_buffer
+    for name in _REPLAY:
+        stored = tensors[f"replay/{name}"]
+        if len(stored) > replay.buffer_size:
+            raise ValueError(
+                f"replay memory of {len(stored)} transitions, this run keeps {replay.buffer_size}"
+            )
+        getattr(replay, name)[: len(stored)] = stored
+    position, full = tensors["replay/position"]
+    replay.pos, replay.full = int(position), bool(full)

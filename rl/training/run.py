@@ -1,0 +1,107 @@
+"""A training run: SB3 learns, this records, validates, keeps checkpoints and resumes."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+
+import torch
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from stable_baselines3.common.logger import Logger, TensorBoardOutputFormat
+
+from hda.task.presets import Preset
+from rl.environment.env import LunarHDAEnv
+from rl.inference.artefacts import library_versions
+from rl.learning.algorithms import make_algorithm
+from rl.settings import AgentSettings
+from rl.training.actor_export import actor_card
+from rl.training.checkpoint import newest_checkpoint, restore_checkpoint
+from rl.training.recorder import Recorder
+from rl.training.run_folder import TrainingPlan, read_run
+
+
+def run_training(
+    folder: Path, preset: Preset, settings: AgentSettings, plan: TrainingPlan, resume: bool
+) -> None:
+    """Train, or go on training.
+
+    Args:
+        folder: of the run.
+        preset: setting to fly; its terrain is built beforehand.
+        settings: what is learnt.
+        plan: how long and how seeded.
+        resume: go on from the newest checkpoint in the folder, if there is one.
+
+    Raises:
+        ValueError: the folder holds a run and `resume` is not set, or holds a run with other settings.
+    """
+    torch.set_num_threads(1)
+    precision = torch.get_float32_matmul_precision()
+    torch.set_float32_matmul_precision(settings.matmul_precision)
+    try:
+        _train(folder, preset, settings, plan, resume)
+    finally:
+        torch.set_float32_matmul_precision(precision)
+
+
+def _train(folder: Path, preset: Preset, settings: AgentSettings, plan: TrainingPlan, resume: bool) -> None:
+    checkpoint = _open_folder(folder, preset, settings, plan, resume)
+    env = LunarHDAEnv(preset, layout=settings.layout, action_ranges=settings.action_ranges)
+    algorithm = make_algorithm(settings, env, plan.seed)
+    algorithm.set_logger(Logger(str(folder), [TensorBoardOutputFormat(str(folder / "tensorboard"))]))
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn(
+            "{task.completed}/{task.total} steps, {task.fields[rate]:.0f}/s, safe {task.fields[safe]:.1f} %"
+        ),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(elapsed_when_finished=True),
+    )
+    with Progress(*columns) as progress:
+        recorder = Recorder(folder, plan, settings, env, progress)
+        if checkpoint is not None:
+            recorder.restore(restore_checkpoint(checkpoint, algorithm, env))
+            progress.console.print(f"resuming {folder} at step {algorithm.num_timesteps}")
+        remaining = plan.steps - algorithm.num_timesteps
+        if remaining > 0:
+            algorithm.learn(remaining, recorder, log_interval=10**9, reset_num_timesteps=False)
+            recorder.on_rollout_start()  # what is due after the last update
+    algorithm.logger.close()
+
+
+def _open_folder(
+    folder: Path, preset: Preset, settings: AgentSettings, plan: TrainingPlan, resume: bool
+) -> Path | None:
+    """Write `run.json`, or check it; give the checkpoint to resume from."""
+    asked = json.loads(
+        json.dumps(
+            {
+                "preset": preset.name,
+                "recipe": plan.recipe,
+                "settings": asdict(settings),
+                "seed": plan.seed,
+            }
+        )
+    )
+    card = folder / "run.json"
+    if card.exists():
+        if not resume:
+            raise ValueError(
+                f"{folder} already holds a run: pass --resume to go on with it, or another --out"
+            )
+        before = read_run(folder)
+        changed = [name for name, value in asked.items() if before.get(name) != value]
+        if changed:
+            raise ValueError(
+                f"{folder} was begun with another {' and '.join(changed)}; resume it with the same"
+            )
+    folder.mkdir(parents=True, exist_ok=True)
+    contents = {**asked, "plan": asdict(plan), "versions": library_versions(), "card": actor_card(settings)}
+    card.write_text(json.dumps(contents, indent=1, sort_keys=True) + "\n")
+    checkpoint = newest_checkpoint(folder) if resume else None
+    if checkpoint is None:
+        for name in ("training.csv", "validation.csv"):
+            (folder / name).unlink(missing_ok=True)
+    return checkpoint

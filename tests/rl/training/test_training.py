@@ -1,0 +1,160 @@
+from __future__ import annotations
+
+import csv
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hda.task.presets import PRESETS
+from rl.inference.artefacts import ArtefactError, load_artefact
+from rl.settings import RECIPES
+from rl.training.run import run_training
+from rl.training.run_folder import TrainingPlan, read_rows
+
+PAPER = PRESETS["paper"]
+SMALL = {
+    name: replace(RECIPES[name], hidden=(16, 16), batch_size=16, random_steps=40, replay_size=90)
+    for name in ("td3", "sac", "ddpg", "tqc")
+}
+"""Networks and a replay memory so small that it wraps around within a test."""
+
+
+def plan(steps: int, seed: int = 0) -> TrainingPlan:
+    return TrainingPlan(
+        steps, seed, validate_every=50, validation_episodes=2, checkpoint_every=30, log_every=20
+    )
+
+
+def weights(folder, step: int):
+    return load_artefact(folder / "actors" / f"step-{step:09d}", "actor").tensors
+
+
+def assert_equal_weights(a, b):
+    assert set(a) == set(b)
+    for name in a:
+        np.testing.assert_array_equal(a[name], b[name])
+
+
+def columns(path, *dropped):
+    return [{k: v for k, v in row.items() if k not in dropped} for row in read_rows(path)]
+
+
+@pytest.mark.parametrize("name", SMALL)
+def test_a_run_that_is_cut_resumes_to_the_same_weights(name, tmp_path):
+    if name == "tqc":
+        pytest.importorskip("sb3_contrib")
+    whole, cut = tmp_path / "whole", tmp_path / "cut"
+    run_training(whole, PAPER, SMALL[name], plan(150), resume=False)
+    run_training(cut, PAPER, SMALL[name], plan(110), resume=False)
+    assert list(cut.glob("checkpoint-*.json"))
+    run_training(cut, PAPER, SMALL[name], plan(150), resume=True)
+    assert_equal_weights(weights(whole, 150), weights(cut, 150))
+    last = [sorted(folder.glob("checkpoint-*.json"))[-1].with_suffix("") for folder in (whole, cut)]
+    assert last[0].name == last[1].name
+    a, b = (load_artefact(path, "checkpoint") for path in last)
+    assert_equal_weights(a.tensors, b.tensors)
+    assert a.card["counters"] == b.card["counters"]
+    assert a.card["generators"] == b.card["generators"]
+    for log in ("training.csv", "validation.csv"):
+        assert columns(whole / log, "seconds") == columns(cut / log, "seconds")
+
+
+def test_same_seed_same_weights_and_another_seed_others(tmp_path):
+    for name, seed in (("a", 0), ("b", 0), ("c", 1)):
+        run_training(tmp_path / name, PAPER, SMALL["td3"], plan(100, seed), resume=False)
+    a, b, c = (weights(tmp_path / name, 100) for name in "abc")
+    assert_equal_weights(a, b)
+    assert not np.array_equal(a["layer.0.weight"], c["layer.0.weight"])
+
+
+def test_weights_move_and_logs_are_whole(tmp_path):
+    run_training(tmp_path / "run", PAPER, SMALL["td3"], plan(100), resume=False)
+    assert not np.array_equal(
+        weights(tmp_path / "run", 50)["layer.0.weight"], weights(tmp_path / "run", 100)["layer.0.weight"]
+    )
+    rows = read_rows(tmp_path / "run" / "training.csv")
+    assert [int(row["step"]) for row in rows] == [20, 40, 60, 80, 100]
+    assert int(rows[-1]["updates"]) == 60
+    assert float(rows[-1]["critic_loss"]) > 0.0
+    validation = read_rows(tmp_path / "run" / "validation.csv")
+    assert [int(row["step"]) for row in validation] == [50, 100]
+    assert 0.0 <= float(validation[0]["safe_site_percent"]) <= 100.0
+
+
+def test_a_run_is_not_overwritten_or_resumed_with_other_settings(tmp_path):
+    folder = tmp_path / "run"
+    run_training(folder, PAPER, SMALL["td3"], plan(60), resume=False)
+    with pytest.raises(ValueError, match="--resume"):
+        run_training(folder, PAPER, SMALL["td3"], plan(60), resume=False)
+    with pytest.raises(ValueError, match="another seed"):
+        run_training(folder, PAPER, SMALL["td3"], plan(60, seed=1), resume=True)
+    with pytest.raises(ValueError, match="another settings"):
+        run_training(folder, PAPER, replace(SMALL["td3"], discount=0.9), plan(60), resume=True)
+
+
+def test_a_damaged_checkpoint_is_refused(tmp_path):
+    folder = tmp_path / "run"
+    run_training(folder, PAPER, SMALL["td3"], plan(60), resume=False)
+    checkpoint = next(folder.glob("checkpoint-*.safetensors"))
+    content = bytearray(checkpoint.read_bytes())
+    content[-5] ^= 1
+    checkpoint.write_bytes(bytes(content))
+    with pytest.raises(ArtefactError, match="does not match its card"):
+        run_training(folder, PAPER, SMALL["td3"], plan(80), resume=True)
+
+
+def test_fast_update_equals_that_of_sb3(tmp_path):
+    """Same replay, weights and random numbers: FastTD3 and SB3's TD3 agree to rounding."""
+    import torch
+    from stable_baselines3 import TD3
+
+    from rl.environment.env import LunarHDAEnv
+    from rl.learning.td3 import FastTD3
+
+    rng = np.random.default_rng(0)
+    models = []
+    data = [rng.normal(size=(64, n)).astype(np.float32) for n in (44, 44, 5)]
+    for kind in (TD3, FastTD3):
+        model = kind(
+            "MlpPolicy",
+            LunarHDAEnv(),
+            seed=0,
+            buffer_size=64,
+            policy_kwargs={"net_arch": [16, 16]},
+            device="cpu",
+        )
+        model._setup_learn(1, None)
+        assert model.replay_buffer is not None
+        for k in range(64):
+            action = np.clip(data[2][k], -1, 1)
+            done = np.array([k % 8 == 7])
+            model.replay_buffer.add(data[0][k], data[1][k], action, np.array([0.1 * k]), done, [{}])
+        torch.set_float32_matmul_precision("highest")
+        torch.manual_seed(5)
+        np.random.seed(5)  # noqa: NPY002 - SB3's replay memory draws from it
+        model.train(6, 32)
+        models.append(model)
+    for a, b in zip(models[0].policy.parameters(), models[1].policy.parameters(), strict=True):
+        torch.testing.assert_close(a, b, rtol=2e-5, atol=2e-6)
+    assert models[0]._n_updates == models[1]._n_updates == 6
+
+
+def test_the_command_line_trains_and_explains_itself(tmp_path, monkeypatch, capsys):
+    from rl.train import main
+
+    folder = tmp_path / "run"
+    small = ["--random-steps", "20", "--batch-size", "8", "--hidden", "8", "8", "--replay-size", "100"]
+    few = ["--steps", "40", "--validate-every", "40", "--validation-episodes", "2"]
+    monkeypatch.setattr(sys, "argv", ["train", "td3", "--out", str(folder), *small, *few])
+    main()
+    with (folder / "validation.csv").open() as file:
+        assert [row["step"] for row in csv.DictReader(file)] == ["40"]
+    monkeypatch.setattr(sys, "argv", ["train", "td3", "--steps", "0"])
+    with pytest.raises(SystemExit, match="steps must be at least 1"):
+        main()
+    monkeypatch.setattr(sys, "argv", ["train", "td3", "--help"])
+    with pytest.raises(SystemExit):
+        main()
+    assert "--learning-rate" in capsys.readouterr().out
