@@ -34,8 +34,8 @@ class ConvexAnswer:
 
     Attributes:
         plan: the plan, or one without a flight.
-        lossy_flight: the relaxed flight, where it breaks min_thrust or the pointing limit, or the bounds of an
-            engine that cannot stop; else None.
+        lossy_flight: the relaxed flight, where it breaks min_thrust, the pointing limit, or the bounds of
+            an engine that cannot stop; else None.
     """
 
     plan: Plan

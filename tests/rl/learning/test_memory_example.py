@@ -12,7 +12,7 @@ import pytest
 def test_the_example_learns_its_task():
     done = subprocess.run(
         [sys.executable, "-m", "examples.memory_task"],
-        cwd=Path(__file__).parents[2],
+        cwd=Path(__file__).parents[3],
         capture_output=True,
         text=True,
         check=False,
