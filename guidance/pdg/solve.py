@@ -52,20 +52,17 @@ def solve_pdg(
         target: [m] shape (3,), site frame; the trajectory never goes below its altitude.
         lander: the vehicle. Its pointing limit is measured from the z axis.
         gravity: [m/s^2] shape (3,).
-        target_velocity: [m/s] shape (3,), at the target; rest unless given. One that points up is infeasible:
-            it can only be reached from below the target's altitude.
+        target_velocity: [m/s] shape (3,), at the target; one that points up, from below, is infeasible.
         glide_slope_limit: [rad] greatest angle from the z axis, seen from the landing point, in (0, pi/2].
         speed_limit: [m/s] greatest speed.
         time_of_flight: [s] None searches for the best.
-        nodes: N; the plan has N - 1 intervals of equal duration. Where the plan, flown, does not keep its
-            limits between so few nodes, it gets more.
+        nodes: N, for N - 1 equal intervals; more where the flown plan does not keep its limits on so few.
         method: 'convex' (lossless convexification in Clarabel; where that loses min_thrust or the pointing
             limit it asks 'casadi', and `plan.method` says so), 'cvxpy' (the same problem, for reading) or
             'casadi' (the unrelaxed nonconvex problem by fatrop or IPOPT).
         unreachable: what to do where the target is out of reach: 'raise', or plan to the softly reachable
             point 'nearest' to it in its plane (always by the convex method).
-        guess: an earlier Plan of nearly the same flight: what is left of it seeds the search where the
-            indirect method finds no flight within the limits.
+        guess: an earlier Plan of nearly the same flight, for a search that the indirect method cannot start.
         throw: raise where there is no flight; otherwise return a Plan that says why.
 
     Returns:
@@ -86,9 +83,7 @@ def solve_pdg(
         finite_vector("target_velocity", target_velocity, 3),
     )
     _check_choices(nodes, method, unreachable, guess)
-    if time_of_flight is not None:
-        time_of_flight = finite_number("time_of_flight", time_of_flight, above=0.0)
-    plan = answer(Request(problem, nodes, time_of_flight, method, guess), unreachable)
+    plan = answer(Request(problem, nodes, _seconds(time_of_flight), method, guess), unreachable)
     if problem.arrived and time_of_flight is None:
         plan = replace(plan, message=f"{plan.message}; {ARRIVED}")
     if throw and not plan.status.has_flight:
@@ -115,9 +110,11 @@ def replan(
         ValueError: an argument is out of range.
     """
     _check_choices(nodes, method, unreachable, None)
-    if time_of_flight is not None:
-        time_of_flight = finite_number("time_of_flight", time_of_flight, above=0.0)
-    return answer(Request(problem, nodes, time_of_flight, method, provisional=True), unreachable)
+    return answer(Request(problem, nodes, _seconds(time_of_flight), method, provisional=True), unreachable)
+
+
+def _seconds(time_of_flight: float | None) -> float | None:
+    return None if time_of_flight is None else finite_number("time_of_flight", time_of_flight, above=0.0)
 
 
 def _error(plan: Plan) -> InfeasibleError | SolverFailedError:
