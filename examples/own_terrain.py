@@ -1,4 +1,4 @@
-"""Write a square kilometre of ground to an .npy file: what `studies.compare --terrain FILE` reads.
+"""Write a square kilometre of ground to an .npy file: what `studies.compare.command --terrain FILE` reads.
 
     python -m examples.own_terrain site.npy
     python -m studies.compare --terrain site.npy --episodes 100 --policies single-divert nearest-safe

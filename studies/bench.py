@@ -18,7 +18,7 @@ from hda.flight.episode import advance, begin_flight, observe
 from hda.policy import PrivilegedPolicy
 from hda.registry import make_policy
 from hda.task.scenario import sample_scenario
-from studies.command_line import one_line_errors
+from studies.campaign.command_line import one_line_errors
 from studies.terrain_timing import measure_terrain
 
 

@@ -26,12 +26,12 @@ from hda.ground.library import Ground, remove_tiles
 from hda.task.presets import PRESETS, Preset, find_preset
 from hda.task.scenario import sample_scenario
 from hda.terrain.generator import TerrainParameters
-from studies.command_line import one_line_errors
-from studies.executor import local_processes
+from studies.campaign.command_line import one_line_errors
+from studies.campaign.executor import local_processes
+from studies.campaign.monte_carlo import Study, prepare_study, run_study
+from studies.campaign.rows import MEASURES
 from studies.ground_statistics import GroundStatistics, measure_ground
-from studies.monte_carlo import Study, prepare_study, run_study
 from studies.paper import PAPER_ROWS
-from studies.rows import MEASURES
 
 
 @dataclass(frozen=True)

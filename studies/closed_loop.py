@@ -29,11 +29,11 @@ from hda.policies.zem_zev import FixedGainZemZev
 from hda.site_selection import NearestSafeSite, SingleDivertSite, SiteSelection
 from hda.task.presets import Preset, find_preset
 from hda.task.scenario import sample_scenario
-from studies.command_line import one_line_errors
-from studies.executor import local_processes
-from studies.monte_carlo import Study, chunk_bounds, prepare_study
-from studies.rows import EpisodeRow, summarize_episode
-from studies.statistics import wilson_interval
+from studies.campaign.command_line import one_line_errors
+from studies.campaign.executor import local_processes
+from studies.campaign.monte_carlo import Study, chunk_bounds, prepare_study
+from studies.campaign.rows import EpisodeRow, summarize_episode
+from studies.statistics.ratios import wilson_interval
 
 SITES: dict[str, Callable[[], SiteSelection]] = {
     "single-divert": SingleDivertSite,

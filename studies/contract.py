@@ -16,7 +16,7 @@ from hda.policy import Decision, Policy, PrivilegedPolicy
 from hda.task.observation import Observation
 from hda.task.presets import Preset
 from hda.task.scenario import Scenario, sample_scenario
-from studies.rows import summarize_episode
+from studies.campaign.rows import summarize_episode
 
 _CHECK_SEED = 4_000_000_000  # no study is flown at it
 

@@ -18,8 +18,8 @@ from rich.table import Table
 
 from guidance.console import tolerate_encoding
 from guidance.validation import finite_number
-from studies.command_line import one_line_errors
-from studies.reliability import needed_episodes
+from studies.campaign.command_line import one_line_errors
+from studies.statistics.reliability import needed_episodes
 
 _MOST_EPISODES = 50_000_000
 

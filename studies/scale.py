@@ -23,7 +23,7 @@ from rich.table import Table
 from guidance.console import tolerate_encoding
 from guidance.validation import finite_number
 from hda.registry import policy_entry
-from studies.command_line import one_line_errors
+from studies.campaign.command_line import one_line_errors
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from hda.policies.entry import AnyPolicy, PolicyEntry
 from hda.registry import describe_policy, policy_entry
 from hda.task.presets import Preset, find_preset
 from hda.task.scenario import sample_scenario
-from studies.statistics import Interval, least_passing, wilson_interval
+from studies.statistics.ratios import Interval, least_passing, wilson_interval
 
 _MEASURES = ("safe_site", "success")
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-PACKAGES = ("guidance", "hda", "rl")
+PACKAGES = ("guidance", "hda", "rl", "studies")
 WINGS = sorted(path.parent for package in PACKAGES for path in (ROOT / package).rglob("__init__.py"))
 NAMES = [str(wing.relative_to(ROOT)).replace("/", ".") for wing in WINGS]
 MOST_MODULES = 14

@@ -8,9 +8,10 @@ import numpy as np
 from guidance import PAPER_LANDER, Lander, State
 from guidance.descent.problem import LandingProblem
 
+ROOT = Path(__file__).parents[2]
 TARGET = np.array([0.0, 0.0, 50.0])
 GRAVITY = np.array([0.0, 0.0, -1.62])
-CASES = json.loads((Path(__file__).parent / "cases" / "pdg_cases.json").read_text())["cases"]
+CASES = json.loads((ROOT / "studies" / "timing" / "cases" / "pdg_cases.json").read_text())["cases"]
 FEASIBLE = [case for case in CASES if case["feasible"]]
 IMPOSSIBLE = [case for case in CASES if not case["feasible"]]
 

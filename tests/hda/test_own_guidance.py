@@ -48,7 +48,8 @@ def place_mixture(folder: Path) -> Path:
 
 @pytest.mark.parametrize("place", [place_package, place_module, place_mixture])
 @pytest.mark.parametrize(
-    "statement", ["import hda", "import rl", "import studies.compare", "from hda.task.presets import PRESETS"]
+    "statement",
+    ["import hda", "import rl", "import studies.compare.command", "from hda.task.presets import PRESETS"],
 )
 def test_a_foreign_guidance_is_named_with_the_way_out(place, statement, tmp_path):
     file = place(tmp_path)

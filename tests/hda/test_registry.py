@@ -16,7 +16,7 @@ from hda.policies.zem_zev import FixedGainZemZev
 from hda.policy import PrivilegedPolicy
 from hda.registry import policy_entry
 from hda.site_selection import NominalSite
-from studies.command_line import choose_policies
+from studies.campaign.command_line import choose_policies
 
 
 @pytest.fixture(autouse=True)

@@ -14,8 +14,9 @@ from hda.registry import make_policy
 from hda.task.presets import PRESETS, Preset
 from hda.task.rules import Range
 from hda.task.scenario import sample_scenario
-from studies.compare import Comparison, compare
-from studies.failure_causes import (
+from studies.campaign.monte_carlo import Study
+from studies.compare.command import Comparison, compare
+from studies.failures.causes import (
     Cause,
     count_safe_cells,
     explain_failure,
@@ -23,8 +24,7 @@ from studies.failure_causes import (
     last_change,
     read_pixels,
 )
-from studies.failures import Failures, describe_failure, read_study, show_failures
-from studies.monte_carlo import Study
+from studies.failures.command import Failures, describe_failure, read_study, show_failures
 
 HARD = PRESETS["hard"]
 

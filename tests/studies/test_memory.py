@@ -19,9 +19,9 @@ from rl.settings import RECIPES
 from rl.training.candidates import Choice
 from rl.training.run import run_training
 from rl.training.run_folder import TrainingPlan
-from studies.memory import MemoryStudy, PlannedRun, find_sources, planned_runs, study_memory
-from studies.memory_answer import compare_groups, conclude, welch_interval
-from studies.memory_scores import (
+from studies.memory.answer import compare_groups, conclude, welch_interval
+from studies.memory.command import MemoryStudy, PlannedRun, find_sources, planned_runs, study_memory
+from studies.memory.scores import (
     AgentScore,
     collect_scores,
     read_scores,

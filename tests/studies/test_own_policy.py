@@ -16,10 +16,10 @@ import hda
 from hda import registry
 from hda.registry import policy_entry
 from hda.task.presets import PRESETS
-from studies.compare import Comparison, compare, plan_study
+from studies.campaign.study_folder import FolderError
+from studies.compare.command import Comparison, compare, plan_study
 from studies.contract import ContractError, check_contract
-from studies.statistics import least_passing
-from studies.study_folder import FolderError
+from studies.statistics.ratios import least_passing
 from studies.testing import assert_safe_ratio
 
 ROOT = Path(__file__).resolve().parents[2]

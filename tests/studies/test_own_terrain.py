@@ -10,7 +10,7 @@ import pytest
 import tyro
 
 from examples.own_terrain import write_site
-from studies.compare import Comparison, compare, plan_study
+from studies.compare.command import Comparison, compare, plan_study
 
 
 @pytest.fixture(scope="module")

@@ -41,7 +41,7 @@ def test_a_comparison_says_what_the_script_must_do(tmp_path: Path) -> None:
     """Its workers import the script, since it may register policies; so they cannot do without the guard."""
     text = (
         "from pathlib import Path\n"
-        "from studies.compare import Comparison, compare\n"
+        "from studies.compare.command import Comparison, compare\n"
         "options = dict(episodes=20, figures=False, report=False)\n"
         "compare(Comparison(policies=('no-divert',), out=Path('out'), **options))\n"
     )

@@ -9,12 +9,12 @@ from pathlib import Path
 import pytest
 
 from hda.task.presets import PRESETS, Preset
-from studies.points import Rows
-from studies.robustness import Robustness, plan_points, run_robustness
-from studies.robustness_breaks import find_breaks
-from studies.robustness_factors import FACTORS, Factor
-from studies.rows import EpisodeRow
-from studies.study_folder import FolderError
+from studies.campaign.points import Rows
+from studies.campaign.rows import EpisodeRow
+from studies.campaign.study_folder import FolderError
+from studies.robustness.breaks import find_breaks
+from studies.robustness.command import Robustness, plan_points, run_robustness
+from studies.robustness.factors import FACTORS, Factor
 
 
 def flat(preset: Preset) -> dict[str, float]:

@@ -15,8 +15,8 @@ import pytest
 
 from hda.registry import policy_entry, policy_names
 from hda.task.presets import PRESETS
-from studies.monte_carlo import Study, fly_chunk
-from studies.statistics import least_passing
+from studies.campaign.monte_carlo import Study, fly_chunk
+from studies.statistics.ratios import least_passing
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from studies.sample_size import (
     mcnemar_power,
     plan_comparison,
 )
-from studies.statistics import mcnemar_p_value
+from studies.statistics.ratios import mcnemar_p_value
 
 
 @pytest.mark.parametrize(

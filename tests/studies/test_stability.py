@@ -13,18 +13,8 @@ from guidance import MOON_GRAVITY, Lander, State, zem_zev_acceleration
 from hda.flight.vehicle import FlightErrors, FlightStatus, fly_interval
 from hda.policy import Decision, DecisionStatus, ZemZevCommand
 from hda.task.presets import PRESETS
-from studies.stability import Stability, study_stability
-from studies.stability_sweep import gain_box, mean_descent
-from studies.zem_zev_flight import (
-    Clock,
-    error_growth,
-    flight_powers,
-    fly_sampled,
-    speed_vanishes,
-    thrust_bounded,
-    touch_down,
-)
-from studies.zem_zev_loop import (
+from studies.stability.command import Stability, study_stability
+from studies.stability.held_loop import (
     Gains,
     closed_margins,
     least_safe_time,
@@ -33,6 +23,16 @@ from studies.zem_zev_loop import (
     sampled_margins_by_control,
     stable_above,
 )
+from studies.stability.sampled_flight import (
+    Clock,
+    error_growth,
+    flight_powers,
+    fly_sampled,
+    speed_vanishes,
+    thrust_bounded,
+    touch_down,
+)
+from studies.stability.sweep import gain_box, mean_descent
 
 PERIOD = 0.5
 BOX = st.builds(Gains, st.floats(5.0, 7.0), st.floats(1.0, 3.0))

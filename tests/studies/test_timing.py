@@ -11,16 +11,18 @@ import pytest
 
 from guidance import PAPER_LANDER, Lander, Plan, PlanStatus, State, solve_pdg
 from guidance.descent.problem import LandingProblem
-from studies import timing, timing_methods
-from studies.timing import Timing, study_timing
-from studies.timing_conclusions import compare_methods, conclude
-from studies.timing_measures import (
+from studies.timing import command as timing
+from studies.timing import methods as timing_methods
+from studies.timing.command import Timing, study_timing
+from studies.timing.conclusions import compare_methods, conclude
+from studies.timing.gfold_peer import FREE_TIME_SOLVES, gfold_present, plan_gfold
+from studies.timing.measures import (
     Call,
     measure_call,
     summarize_calls,
     time_quantiles,
 )
-from studies.timing_methods import (
+from studies.timing.methods import (
     FATROP_METHOD,
     IPOPT_METHOD,
     Method,
@@ -28,7 +30,6 @@ from studies.timing_methods import (
     reference_cases,
     timed_methods,
 )
-from studies.timing_peer import FREE_TIME_SOLVES, gfold_present, plan_gfold
 
 START = [180.0, 120.0, 940.0, -7.0, -4.0, -28.0, 1200.0]
 TARGET = [0.0, 0.0, 50.0]

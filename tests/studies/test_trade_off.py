@@ -15,11 +15,11 @@ from hda.policies.hazard_aware import HazardAwareSite
 from hda.policies.site_price import HazardAwareWeights
 from hda.registry import make_policy
 from hda.task.scenario import sample_scenario
-from studies.point_score import PointScore
-from studies.statistics import Interval
-from studies.trade_off import TradeOff, find_front, plan_points, run_trade_off
-from studies.trade_off_table import TradeOffRow
-from studies.weight_sweep import SWEEP, change_weight, sweep_name, sweep_path
+from studies.campaign.point_score import PointScore
+from studies.statistics.ratios import Interval
+from studies.trade_off.command import TradeOff, find_front, plan_points, run_trade_off
+from studies.trade_off.table import TradeOffRow
+from studies.trade_off.weights import SWEEP, change_weight, sweep_name, sweep_path
 
 
 @pytest.fixture(autouse=True)
@@ -68,7 +68,7 @@ def test_sweeps_leave_the_default_out() -> None:
 @pytest.mark.parametrize("path", ["failure_csot=3", "failure_cost=-1", "failure_cost=x", "nothing"])
 def test_a_wrong_weight_is_no_policy(path: str) -> None:
     with pytest.raises(ValueError, match="policy"):
-        make_policy(f"studies.weight_sweep:{path}")
+        make_policy(f"studies.trade_off.weights:{path}")
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,123 @@
+"""Where a result comes from: enough to make it again."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import json
+import platform
+import subprocess
+import sys
+from dataclasses import asdict
+from datetime import UTC, datetime
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+from hda.ground.library import FORMAT_VERSION, Ground
+from hda.ground.own_terrain import OwnTerrain
+from studies.campaign.monte_carlo import Study, chunk_episodes
+
+_PACKAGES = (
+    "casadi",
+    "clarabel",
+    "control",
+    "cvxpy",
+    "numba",
+    "numpy",
+    "scipy",
+    "stable-baselines3",
+    "torch",
+)
+
+
+def git_commit() -> str | None:
+    """Commit of the source tree, with `+changes` if it differs; None outside a checkout."""
+    root = Path(__file__).resolve().parents[2]
+    try:
+        commit = _git(root, "rev-parse", "HEAD")
+        return commit + ("+changes" if _git(root, "status", "--porcelain", "--untracked-files=no") else "")
+    except (OSError, subprocess.CalledProcessError):
+        return None
+
+
+def _git(root: Path, *arguments: str) -> str:
+    run = subprocess.run(
+        ["git", *arguments], cwd=root, capture_output=True, text=True, check=True, timeout=20
+    )
+    return run.stdout.strip()
+
+
+def identify_study(study: Study) -> dict[str, Any]:
+    """All that decides the bytes of a study's rows: parameters, versions, digests of the sources."""
+    ground, preset = Ground(study.preset.terrain, study.preset.criteria), asdict(study.preset)
+    if isinstance(study.preset.terrain, OwnTerrain):
+        preset["terrain"] = study.preset.terrain.description()
+    return {
+        "study": {
+            "episodes": study.episodes,
+            "policies": list(study.policies),
+            "study_seed": study.study_seed,
+            "split": study.split,
+            "paths": list(study.paths),
+            "chunk_episodes": chunk_episodes(study.episodes),
+        },
+        "preset": preset,
+        "terrain_key": ground.key,
+        "terrain_format": FORMAT_VERSION,
+        **identify_software(study.paths),
+    }
+
+
+def identify_software(paths: tuple[str, ...] = ()) -> dict[str, Any]:
+    """What must be the same in every process that flies episodes of a study.
+
+    Args:
+        paths: paths `package.module:Name` of policies that are not registered.
+    """
+    return {
+        "python": platform.python_version(),
+        "machine": f"{platform.system()} {platform.machine()}",
+        "versions": {name: metadata.version(name) for name in ("lunar-hda", *_PACKAGES)},
+        "sources": digest_sources(paths),
+    }
+
+
+def digest_sources(paths: tuple[str, ...]) -> dict[str, str]:
+    """Package -> digest of every file in it, weights included; also the module of a policy given by path."""
+    root = Path(__file__).resolve().parents[1]
+    digests = {name: _digest(root.parent / name) for name in ("guidance", "hda", "rl")}
+    digests["studies"] = _digest(root / "campaign" / "monte_carlo.py", root / "campaign" / "rows.py")
+    for path in paths:
+        module = path.partition(":")[0]
+        found = importlib.util.find_spec(module)
+        if found is not None and found.origin is not None:
+            digests[module] = _digest(Path(found.origin))
+    return digests
+
+
+def _digest(*places: Path) -> str:
+    total = hashlib.sha256()
+    for place in places:
+        files = [place] if place.is_file() else sorted(p for p in place.rglob("*") if p.is_file())
+        for file in files:
+            if "__pycache__" not in file.parts:
+                total.update(f"{file.relative_to(place.parent).as_posix()}\n".encode())
+                total.update(hashlib.sha256(file.read_bytes()).digest())
+    return total.hexdigest()[:16]
+
+
+def describe_study(study: Study, flight: dict[str, Any]) -> dict[str, Any]:
+    """What the study is, and how it was made: source commit, command, sessions and retries."""
+    return {
+        **identify_study(study),
+        "command": " ".join(sys.argv),
+        "finished": datetime.now(UTC).isoformat(timespec="seconds"),
+        "git_commit": git_commit(),
+        "flight": flight,
+    }
+
+
+def write_provenance(path: Path, provenance: dict[str, Any]) -> None:
+    """Write a provenance as JSON."""
+    path.write_text(json.dumps(provenance, indent=1, sort_keys=True, default=str) + "\n")

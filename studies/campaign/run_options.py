@@ -1,0 +1,49 @@
+"""What the commands that fly several studies in one run ask alike."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from guidance.validation import finite_number
+from studies.campaign.study_folder import Existing
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunOptions:
+    """Options of a run; a command adds its own, and describes those that mean something else there.
+
+    Attributes:
+        policies: names of policies; `default` is every one that is not slow and not made for another
+            preset; `package.module:Name` is your own.
+        episodes: episodes per policy.
+        study_seed: seed of the study; equal seeds give equal episodes.
+        split: tile split: validation or fresh.
+        workers: processes; changes nothing but the time.
+        out: folder for results.
+        resume: keep finished episodes of the same study in the folder, and fly what is missing.
+        figures: draw the figure.
+    """
+
+    policies: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME ...")] = ("default",)
+    episodes: int
+    study_seed: int = 0
+    split: str = "validation"
+    workers: int = 2
+    out: Path
+    resume: bool = False
+    figures: bool = True
+
+    def __post_init__(self) -> None:
+        """Check every number."""
+        finite_number("episodes", self.episodes, at_least=1)
+        finite_number("workers", self.workers, at_least=1)
+        finite_number("study_seed", self.study_seed, at_least=0)
+
+    @property
+    def existing(self) -> Existing:
+        """What to do with a folder that holds a study."""
+        return Existing.RESUME if self.resume else Existing.REFUSE

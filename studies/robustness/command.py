@@ -1,0 +1,253 @@
+"""How policies stand up to what their design did not assume: one factor at a time, on the same episodes.
+
+Each factor is one number of the preset: engine, sensor, ground, navigation, start. At each level every policy
+flies the same episodes; a figure and a table per factor show safe sites, successes and propellant, and
+breaks.md tells which policy breaks first and why: the ending that became more frequent, and the causes that
+`studies.failures` computes for those episodes.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import tyro
+from rich.console import Console
+from rich.progress import track
+
+from guidance.console import tolerate_encoding
+from guidance.validation import finite_number
+from hda.flight.episode import fly
+from hda.ground.library import Ground, load_tile, tile_numbers
+from hda.registry import policy_entry
+from hda.task.presets import Preset, find_preset
+from hda.task.scenario import sample_scenario
+from studies.campaign.command_line import choose_policies, open_folder, resumable
+from studies.campaign.monte_carlo import Study
+from studies.campaign.point_score import SCORE_COLUMNS, score_rows
+from studies.campaign.points import Point, Rows, fly_points
+from studies.campaign.provenance import describe_study, write_provenance
+from studies.campaign.run_options import RunOptions
+from studies.failures.causes import explain_failure
+from studies.robustness.breaks import Break, find_breaks, success_drop
+from studies.robustness.factors import FACTORS, Factor, choose_factors
+from studies.statistics.ratios import wilson_interval
+
+_NOMINAL = "nominal"
+_EXPLAINED = 12  # failures of a break that are flown again
+
+
+@dataclass(frozen=True, kw_only=True)
+class Robustness(RunOptions):
+    """Command line of the robustness sweep.
+
+    Attributes:
+        factors: names of factors; `all` is every one.
+        episodes: episodes per policy and level.
+        levels: levels per factor beside the preset's own value, at most.
+        preset: the setting that is varied.
+        study_seed: seed of the study; equal seeds give equal episodes at every level.
+        resume: keep finished episodes of the same sweep in the folder, and fly what is missing.
+        figures: draw a figure per factor.
+    """
+
+    factors: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME ...")] = ("all",)
+    episodes: int = 200
+    levels: int = 4
+    preset: str = "paper"
+    out: Path = Path("results/robustness")
+
+    def __post_init__(self) -> None:
+        """Check every number."""
+        super().__post_init__()
+        finite_number("levels", self.levels, at_least=1)
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """One flown factor.
+
+    Attributes:
+        factor: what was varied.
+        own: the preset's own value.
+        levels: value -> rows, the own value among them, rising.
+        hazard: value -> measured share of unsafe ground on the tiles.
+        breaks: where policies break, the earliest first.
+    """
+
+    factor: Factor
+    own: float
+    levels: dict[float, Rows]
+    hazard: dict[float, float]
+    breaks: list[Break]
+
+
+def plan_points(options: Robustness) -> tuple[Study, list[Point]]:
+    """The study at the preset's own values, and every point of the sweep, that one first.
+
+    Raises:
+        ValueError: an option names something unknown.
+    """
+    preset = find_preset(options.preset)
+    policies, paths = choose_policies(options.policies, preset.name)
+    own = Study(preset, policies, options.episodes, options.study_seed, options.split, paths)
+    points = [Point(_NOMINAL, own)]
+    for factor in choose_factors(options.factors):
+        for level in factor.chosen(preset, options.levels):
+            points.append(Point(_label(factor, level), replace(own, preset=factor.vary(preset, level))))
+    return own, points
+
+
+def _label(factor: Factor, level: float) -> str:
+    return f"{factor.name}/{level:g}"
+
+
+def measure_hazard(preset: Preset, split: str) -> float:
+    """Share of unsafe cells on the tiles of a split."""
+    ground = Ground(preset.terrain, preset.criteria)
+    shares = [
+        1.0 - float(load_tile(ground, number, split).deterministic.mean()) for number in tile_numbers(split)
+    ]
+    return float(np.mean(shares))
+
+
+def run_robustness(options: Robustness) -> list[Sweep]:
+    """Fly the sweep and write its folder.
+
+    Raises:
+        ValueError: an option is out of range or names something unknown, a folder holds another study, or a
+            policy or a worker failed.
+        OSError: the folder cannot be written.
+    """
+    own, points = plan_points(options)
+    out = open_folder(options.out)
+    flown = fly_points(out, points, options.existing, options.workers)
+    studies = {point.label: point.study for point in points}
+    sweeps = []
+    for factor in choose_factors(options.factors):
+        value = factor.nominal(own.preset)
+        varied = {level: _label(factor, level) for level in factor.chosen(own.preset, options.levels)}
+        levels = dict(sorted({value: flown[_NOMINAL], **{k: flown[n] for k, n in varied.items()}}.items()))
+        presets = {k: studies[varied[k]].preset if k in varied else own.preset for k in levels}
+        hazard = {k: measure_hazard(preset, options.split) for k, preset in presets.items()}
+        others = {k: rows for k, rows in levels.items() if k in varied}
+        breaks = find_breaks(factor.name, value, flown[_NOMINAL], others)
+        sweeps.append(Sweep(factor, value, levels, hazard, breaks))
+    write_sweeps(out, sweeps, studies, options)
+    write_provenance(out / "provenance.json", describe_study(own, {"points": [p.label for p in points]}))
+    return sweeps
+
+
+def explain_break(found: Break, study: Study) -> str:
+    """Causes of the failures that a break brought, each flown again, the most frequent first."""
+    causes = Counter()
+    pilot = study.make_policy(found.policy)
+    for episode in found.episodes[:_EXPLAINED]:
+        record = fly(pilot, sample_scenario(study.preset, study.study_seed, episode, study.split))
+        causes[explain_failure(record).cause.value] += 1
+    return "; ".join(f"{count} x {cause}" for cause, count in causes.most_common())
+
+
+def write_sweeps(
+    out: Path, sweeps: Sequence[Sweep], studies: Mapping[str, Study], options: Robustness
+) -> None:
+    """Write a table and a figure per factor, and the breaks."""
+    for sweep in sweeps:
+        write_levels(out / f"{sweep.factor.name}.csv", sweep, options.study_seed)
+        write_level_markdown(out / f"{sweep.factor.name}.md", sweep)
+        if options.figures:
+            from studies.robustness.picture import draw_sweep
+
+            draw_sweep(out / f"{sweep.factor.name}.png", sweep.factor.label, sweep.own, sweep.levels)
+    found = [(b, studies[_label(FACTORS[b.factor], b.level)]) for sweep in sweeps for b in sweep.breaks]
+    reasons = [explain_break(b, study) for b, study in track(found, "explaining breaks", transient=True)]
+    write_breaks(out, [b for b, _ in found], reasons)
+
+
+def write_levels(path: Path, sweep: Sweep, study_seed: int) -> None:
+    """Write every level and policy of a factor as CSV; ratios in percent."""
+    endings = ("hard-landing", "unsafe-site", "crash", "tank-empty", "timed-out")
+    header = ["factor", "level", "own_value", "hazard_percent", "policy", "privileged", "episodes"]
+    header += [*SCORE_COLUMNS, "success_drop_points", "drop_low", "drop_high"]
+    header += [name.replace("-", "_") for name in endings]
+    nominal = sweep.levels[sweep.own]
+    with path.open("w", newline="") as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(header)
+        for level, policies in sweep.levels.items():
+            for policy, rows in policies.items():
+                cells: list[object] = [sweep.factor.name, f"{level:.6g}", level == sweep.own]
+                cells += [f"{100.0 * sweep.hazard[level]:.4g}", policy, policy_entry(policy).privileged]
+                cells += [len(rows), *score_rows(rows, study_seed).cells()]
+                drop = success_drop(nominal[policy], rows)
+                cells += [f"{100.0 * value:.9g}" for value in (drop.estimate, drop.low, drop.high)]
+                counts = Counter(row.outcome for row in rows)
+                writer.writerow([*cells, *(counts[name] for name in endings)])
+
+
+def write_level_markdown(path: Path, sweep: Sweep) -> None:
+    """Write the successes of a factor for a document: a line per policy, a column per level."""
+    levels = [f"**{level:.4g}**" if level == sweep.own else f"{level:.4g}" for level in sweep.levels]
+    lines = [f"{sweep.factor.label}: success %, Wilson's 95 % interval; the preset's own value is bold", ""]
+    lines += ["| policy | " + " | ".join(levels) + " |", "|---|" + "---:|" * len(levels)]
+    for policy in sweep.levels[sweep.own]:
+        cells = []
+        for rows in sweep.levels.values():
+            low_high = wilson_interval(sum(row.success for row in rows[policy]), len(rows[policy]))
+            ends = (low_high.estimate, low_high.low, low_high.high)
+            cells.append("{:.1f} ({:.1f}-{:.1f})".format(*(100.0 * value for value in ends)))
+        star = " *" if policy_entry(policy).privileged else ""
+        lines.append(f"| {policy}{star} | " + " | ".join(cells) + " |")
+    path.write_text("\n".join(lines) + "\n")
+
+
+def write_breaks(out: Path, breaks: Sequence[Break], reasons: Sequence[str]) -> None:
+    """Write where policies break, as CSV and for a document; the first to break leads its factor."""
+    with (out / "breaks.csv").open("w", newline="") as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        names = ["factor", "side", "step", "policy", "level", "success_percent", "drop_points", "drop_low"]
+        writer.writerow([*names, "drop_high", "ending", "more_failures", "causes"])
+        for b, reason in zip(breaks, reasons, strict=True):
+            ends = (b.success, b.drop.estimate, b.drop.low, b.drop.high)
+            percent = [f"{100.0 * value:.9g}" for value in ends]
+            row = [b.factor, b.side, b.step, b.policy, f"{b.level:.6g}", *percent, b.ending, b.more, reason]
+            writer.writerow(row)
+    lines = ["| factor | policy | breaks at | success % | drop, points | by | causes |"]
+    lines.append("|---|---|---:|---:|---:|---|---|")
+    for b, reason in zip(breaks, reasons, strict=True):
+        drop = "{:.1f} ({:.1f}-{:.1f})".format(*(100 * v for v in (b.drop.estimate, b.drop.low, b.drop.high)))
+        cells = [b.factor, b.policy, f"{b.level:g}", f"{100 * b.success:.1f}", drop, b.ending, reason]
+        lines.append("| " + " | ".join(cells) + " |")
+    (out / "breaks.md").write_text("\n".join(lines) + "\n")
+
+
+def print_sweeps(sweeps: Sequence[Sweep]) -> None:
+    """Say in words who breaks first along each factor."""
+    console = Console()
+    for sweep in sweeps:
+        if not sweep.breaks:
+            console.print(f"{sweep.factor.name}: no policy breaks", highlight=False, markup=False)
+            continue
+        first = sweep.breaks[0]
+        same = [b.policy for b in sweep.breaks[1:] if (b.step, b.side) == (first.step, first.side)]
+        tail = f"; also {', '.join(same)}" if same else ""
+        console.print(
+            f"{sweep.factor.name}: {first.policy} breaks first, at {first.level:g} ({sweep.factor.label}):"
+            f" success falls by {100.0 * first.drop.estimate:.1f} points, mostly {first.ending}{tail}",
+            highlight=False,
+            markup=False,
+        )
+
+
+def main() -> None:
+    """Command line; a wrong option is one line on stderr and exit code 2."""
+    tolerate_encoding()
+    with resumable():
+        options = tyro.cli(Robustness, description=__doc__)
+        print_sweeps(run_robustness(options))
+        Console().print(f"results in {options.out}")

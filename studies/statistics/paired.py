@@ -1,0 +1,91 @@
+"""Differences between policies that flew the same episodes."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from studies.statistics.ratios import (
+    Interval,
+    PairCounts,
+    count_pairs,
+    wilson_interval,
+)
+
+
+def paired_ratio_interval(first: ArrayLike, second: ArrayLike, confidence: float = 0.95) -> Interval:
+    """Interval of the difference of two success ratios over the same independent episodes.
+
+    Newcombe's hybrid score interval with a corrected correlation (Statistics in Medicine 17, 1998, paired
+    data, method 10): the Wilson limits of both ratios, joined by the correlation of the pairs. It is defined
+    where the policies never differ.
+
+    Args:
+        first: shape (n,), booleans or zeros and ones.
+        second: the same of the other policy, episode by episode.
+        confidence: in (0, 0.9999].
+
+    Returns:
+        First less second.
+
+    Raises:
+        ValueError: an argument is empty or holds something else, or the shapes differ.
+    """
+    return pair_count_interval(count_pairs(first, second), confidence)
+
+
+def pair_count_interval(pairs: PairCounts, confidence: float = 0.95) -> Interval:
+    """The interval of `paired_ratio_interval`, from counts.
+
+    Raises:
+        ValueError: there is no episode, or `confidence` is out of range.
+    """
+    count = pairs.episodes
+    first, second = pairs.both + pairs.only_first, pairs.both + pairs.only_second
+    a = wilson_interval(first, count, confidence)
+    b = wilson_interval(second, count, confidence)
+    correlation = _corrected_correlation(pairs)
+    difference = (first - second) / count
+
+    def reach(near: float, far: float) -> float:
+        return math.sqrt(max(0.0, near * near - 2.0 * correlation * near * far + far * far))
+
+    low = difference - reach(a.estimate - a.low, b.high - b.estimate)
+    high = difference + reach(a.high - a.estimate, b.estimate - b.low)
+    return Interval(difference, max(-1.0, low), min(1.0, high))
+
+
+def _corrected_correlation(pairs: PairCounts) -> float:
+    """Phi coefficient of the pairs; a positive association is lessened by half an episode's worth."""
+    first, second = pairs.both + pairs.only_first, pairs.both + pairs.only_second
+    margins = first * (pairs.episodes - first) * second * (pairs.episodes - second)
+    if margins == 0:
+        return 0.0
+    product = float(pairs.both * pairs.neither - pairs.only_first * pairs.only_second)
+    if product > 0.0:
+        product = max(product - pairs.episodes / 2.0, 0.0)
+    return product / math.sqrt(margins)
+
+
+def holm_adjust(p_values: ArrayLike) -> NDArray[np.float64]:
+    """Adjusted p-values that keep the family-wise error rate (Holm, Scand. J. Statist. 6, 1979).
+
+    Args:
+        p_values: shape (n,), in [0, 1].
+
+    Returns:
+        Shape (n,), in the order given; not below the plain ones.
+
+    Raises:
+        ValueError: a value is not a probability.
+    """
+    plain = np.asarray(p_values, dtype=np.float64)
+    if plain.ndim != 1 or not ((plain >= 0.0) & (plain <= 1.0)).all():
+        raise ValueError("p_values must be a one-dimensional array of probabilities")
+    order = np.argsort(plain, kind="stable")
+    stepped = plain[order] * np.arange(plain.size, 0, -1)
+    adjusted = np.empty_like(plain)
+    adjusted[order] = np.minimum(np.maximum.accumulate(stepped), 1.0)
+    return adjusted

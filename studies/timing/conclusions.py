@@ -1,0 +1,114 @@
+"""What the timing study concludes: methods compared on the same cases, and the bars in words.
+
+Methods are compared by the processor time of this process, all threads together: other jobs on the machine
+disturb it little.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from studies.timing.measures import Call, Summary
+from studies.timing.methods import FATROP_METHOD, IPOPT_METHOD, PEER_NODES, Method
+
+FREE_TO_FIXED_BAR = 2.0
+"""Most that a free-time solve may cost, in fixed-time solves of the same nodes."""
+PEER_BAR = 100.0
+"""Least factor by which solve_pdg should beat gfold's free-time solve at 30 nodes."""
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Two methods on the same feasible cases.
+
+    Attributes:
+        ratio: median processor time of the first over that of the second.
+        paired: median over cases of the ratio of the two.
+        first_regret: [kg] median of the first, over cases where both keep every limit.
+        second_regret: [kg] of the second.
+    """
+
+    ratio: float
+    paired: float
+    first_regret: float
+    second_regret: float
+
+
+def compare_methods(calls: Sequence[Call], first: str, second: str) -> Comparison:
+    """Compare two methods by their labels; repeated calls of a case count by their medians."""
+    times, regrets = [], []
+    for name in dict.fromkeys(call.case for call in calls if call.feasible):
+        own = [[call for call in calls if call.case == name and call.method == m] for m in (first, second)]
+        times.append([np.median([call.processor for call in group]) for group in own])
+        if all(call.keeps_limits for group in own for call in group):
+            regrets.append([np.median([call.regret for call in group]) for group in own])
+    spent = np.array(times)
+    cost = np.median(regrets, axis=0) if regrets else (np.nan, np.nan)
+    ratio = np.median(spent[:, 0]) / np.median(spent[:, 1])
+    return Comparison(
+        float(ratio), float(np.median(spent[:, 0] / spent[:, 1])), float(cost[0]), float(cost[1])
+    )
+
+
+def conclude(methods: Sequence[Method], calls: Sequence[Call], summaries: Sequence[Summary]) -> list[str]:
+    """The bars in words, met or not, on the starts drawn from the preset."""
+    starts = [call for call in calls if call.drawn]
+    ours = {(m.nodes, m.free): m.label for m in methods if m.name == "solve_pdg"}
+    meshes = sorted({nodes for nodes, _ in ours}, reverse=True)
+    words = []
+    for nodes in meshes:
+        found = compare_methods(starts, ours[nodes, True], ours[nodes, False])
+        met = "met" if found.ratio <= FREE_TO_FIXED_BAR else "NOT met"
+        words.append(
+            f"Drawn starts, solve_pdg at {nodes} nodes: a free-time solve costs {found.ratio:.2f} fixed-time "
+            f"solves (medians; {found.paired:.2f} case by case); bar {FREE_TO_FIXED_BAR:g}: {met}."
+        )
+    words += _fatrop_against_ipopt(starts, {summary.method: summary for summary in summaries}, methods)
+    peers = [m for m in methods if m.name == "gfold" and m.free and m.nodes == PEER_NODES]
+    if not peers:
+        words.append("gfold is not installed (extra `peers`): no comparison with it was made.")
+    for peer in peers:
+        words += [_against_peer(starts, peer, ours[nodes, True]) for nodes in meshes]
+        broken = sum(summary.broken for summary in summaries if summary.method == peer.label)
+        words.append(
+            f"gfold plans that break a limit: {broken} (a pointing limit is accepted and not kept). Its "
+            "steps are t/n on n nodes, so a flight asked to last t lasts t (n - 1)/n; here it is asked for "
+            "the longer time and judged on the steps it flew."
+        )
+    return words
+
+
+def _fatrop_against_ipopt(
+    starts: Sequence[Call], summaries: dict[str, Summary], methods: Sequence[Method]
+) -> list[str]:
+    """The two nonlinear solvers on the same programme: time on the drawn starts, plans on all cases."""
+    words = []
+    for free in (True, False):
+        labels = {
+            m.name: m.label for m in methods if m.free is free and m.name in (FATROP_METHOD, IPOPT_METHOD)
+        }
+        if len(labels) < 2:
+            continue
+        ipopt, fatrop = labels[IPOPT_METHOD], labels[FATROP_METHOD]
+        found = compare_methods(starts, ipopt, fatrop)
+        solved = " and ".join(f"{summaries[label].solved} by '{label}'" for label in (fatrop, ipopt))
+        words.append(
+            f"Drawn starts, CasADi, {'free' if free else 'fixed'} time: IPOPT takes {found.ratio:.2f} times "
+            f"as long as fatrop ({found.paired:.2f} case by case); of all "
+            f"{summaries[ipopt].feasible} feasible cases {solved} are solved within every limit."
+        )
+    return words
+
+
+def _against_peer(starts: Sequence[Call], peer: Method, ours: str) -> str:
+    found = compare_methods(starts, peer.label, ours)
+    better = found.second_regret < found.first_regret
+    met = "met" if found.ratio >= PEER_BAR and better else "NOT met"
+    return (
+        f"Drawn starts: gfold's free-time solve at {peer.nodes} nodes takes {found.ratio:.1f} times as long "
+        f"as '{ours}' ({found.paired:.1f} case by case) and burns {1e3 * found.first_regret:.1f} g too much "
+        f"against {1e3 * found.second_regret:.1f} g; bar {PEER_BAR:g} times with less regret: {met}."
+    )
