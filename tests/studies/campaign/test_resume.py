@@ -190,7 +190,7 @@ def test_tables_without_shards_are_a_study_too(tmp_path: Path) -> None:
 HOLD = """
 import sys, time
 from pathlib import Path
-from tests.studies.test_resume import STUDY
+from tests.studies.campaign.test_resume import STUDY
 from studies.campaign.study_folder import Existing, open_study_folder
 with open_study_folder(Path(sys.argv[1]), STUDY, Existing.RESUME):
     print("held", flush=True)
