@@ -4,7 +4,7 @@ The state of a stage is (r, v, ln m, u), with the time of flight T where that is
 next node. fatrop reads this structure from the order of variables and constraints: each stage states the
 motion to the next one first, as x_next - f(x, control). IPOPT takes any order.
 
-`python -m studies.timing`: IPOPT takes 2.8 times as long as fatrop at free time and 2.4 times at fixed time;
+`python -m studies.timing`: IPOPT takes 2.7 times as long as fatrop at free time and 2.3 times at fixed time;
 fatrop alone solves 45 of 47 cases, IPOPT all.
 """
 
