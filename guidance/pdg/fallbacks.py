@@ -112,10 +112,10 @@ def _plan_convex_from(request: Request, seed: float | None) -> Plan:
     """The same, with the time [s] from which the search starts where the indirect method has none."""
     from guidance.planning.convex_planner import plan_convex
 
-    answer = plan_convex(request.problem, request.nodes, request.time_of_flight, seed, request.provisional)
-    if answer.lossy_flight is None:
-        return answer.plan
-    return _plan_unrelaxed(answer.plan, answer.lossy_flight, request.time_of_flight)
+    found = plan_convex(request.problem, request.nodes, request.time_of_flight, seed, request.provisional)
+    if found.lossy_flight is None:
+        return found.plan
+    return _plan_unrelaxed(found.plan, found.lossy_flight, request.time_of_flight)
 
 
 def _plan_unrelaxed(lost: Plan, relaxed: Trajectory, time_of_flight: float | None) -> Plan:

@@ -105,7 +105,7 @@ def _finish(
         return ConvexAnswer(none)
     if not found.solved:
         return ConvexAnswer(replace(none, message=f"no flight of {found.time:g} s ({found.answer.words})"))
-    if found.propellant_share > problem.log_mass_ratio + _OVERDRAFT:
+    if not _affordable(problem, found):
         return ConvexAnswer(replace(none, message=_shortage(problem, found)))
     solution, more = task.refine(found)
     solves += more
@@ -194,7 +194,7 @@ def plan_nearest(
     else:
         outcome = minimise_over_time(economical, SHARE_TOLERANCE, least.time, coarse_first=False)
         last, more = outcome.solution, outcome.solves
-        if last is not None and last.propellant_share > problem.log_mass_ratio + _OVERDRAFT:
+        if last is not None and not _affordable(problem, last):
             last, more = economical.solve(least.time), more + 1
     worth = _worth_a_search(time_of_flight, provisional)
     return _finish(economical, last, solves + more, PlanStatus.NEAREST, worth).plan
