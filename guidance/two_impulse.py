@@ -13,8 +13,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from guidance.arrays import Array
 from guidance.kernel import compile_kernel
 from guidance.lander import Lander
 from guidance.state import State
@@ -26,7 +27,7 @@ _GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 
 
 @compile_kernel
-def _cost(east: float, north: float, up: float, motion: NDArray[np.float64], time: float) -> float:
+def _cost(east: float, north: float, up: float, motion: Array, time: float) -> float:
     """[m/s] at one time of flight; `motion` is (velocity (3), pull, greatest acceleration)."""
     vx, vy, vz, pull, push = motion
     first_x, first_y = east / time, north / time
@@ -37,7 +38,7 @@ def _cost(east: float, north: float, up: float, motion: NDArray[np.float64], tim
 
 
 @compile_kernel
-def least_cost(east: float, north: float, up: float, motion: NDArray[np.float64]) -> tuple[float, float]:
+def least_cost(east: float, north: float, up: float, motion: Array) -> tuple[float, float]:
     """(velocity change [m/s], time of flight [s]) of the cheapest two-impulse landing at an offset [m]."""
     sink, pull = motion[2], motion[3]
     fall = (sink + math.sqrt(max(sink * sink - 2.0 * pull * up, 0.0))) / pull
@@ -58,11 +59,11 @@ def least_cost(east: float, north: float, up: float, motion: NDArray[np.float64]
 
 @compile_kernel
 def _fill(
-    east: NDArray[np.float64],
-    north: NDArray[np.float64],
+    east: Array,
+    north: Array,
     up: float,
-    motion: NDArray[np.float64],
-    out: NDArray[np.float64],
+    motion: Array,
+    out: Array,
 ) -> None:
     for row in range(north.size):
         for column in range(east.size):
@@ -71,12 +72,12 @@ def _fill(
 
 def divert_cost(
     state: State,
-    east: NDArray[np.float64],
-    north: NDArray[np.float64],
+    east: Array,
+    north: Array,
     plane: float,
     lander: Lander,
     gravity: ArrayLike,
-) -> NDArray[np.float64]:
+) -> Array:
     """Estimated propellant to land softly at each point of a lattice.
 
     Args:

@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from guidance.arrays import Array, Index
 from guidance.convex import constraints
 from guidance.convex.clarabel_solver import ConicSolver, SolveStatus
 from guidance.convex.constraint_set import ConstraintSet
@@ -22,8 +22,6 @@ from guidance.convex.constraints import Rows
 from guidance.convex.layout import Layout
 from guidance.convex.programme import ConvexSolution, cones_of, nominal_numbers
 from guidance.convex.scaling import ScaledProblem
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -46,7 +44,7 @@ class Branching:
         return Layout(self.constraint_set.nodes)
 
     @cached_property
-    def columns(self) -> NDArray[np.int64]:
+    def columns(self) -> Index:
         """Shape (branches, n): where each number of a branch's own layout stands in the decision vector."""
         size = self.layout.size
         shared = size // self.constraint_set.nodes * self.shared_nodes

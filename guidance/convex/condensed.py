@@ -11,14 +11,12 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from guidance.arrays import Array, Index
 from guidance.convex.constraints import Rows
 from guidance.convex.layout import Layout
 from guidance.convex.scaling import ScaledProblem
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 _PER_NODE = 5  # log-mass 1, thrust acceleration 3, its slack 1: in the order of Layout
 _BELOW = 1e-8  # scaled altitude below the target's that counts as rounding
 

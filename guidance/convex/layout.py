@@ -6,11 +6,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
+
+from guidance.arrays import Index
 
 _PER_NODE = 11  # position 3, velocity 3, log-mass 1, thrust acceleration 3, its slack 1
-
-Index = NDArray[np.int64]
 
 
 @dataclass(frozen=True)

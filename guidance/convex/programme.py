@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.convex import constraints
 from guidance.convex.clarabel_solver import ConicAnswer, ConicSolver, SolveStatus
 from guidance.convex.condensed import CondensedLayout, burnt_mass, expand
@@ -24,8 +24,6 @@ from guidance.convex.scaling import ScaledProblem, scale_problem
 from guidance.descent.problem import LandingProblem
 from guidance.descent.trajectory import Trajectory
 from guidance.state import State
-
-Array = NDArray[np.float64]
 
 _CONSTANT_FAMILIES: frozenset[Family] = frozenset(
     {burnt_mass, constraints.altitude_floor, constraints.thrust_cone}

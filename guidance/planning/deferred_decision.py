@@ -15,8 +15,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from guidance.arrays import Array
 from guidance.convex.branched_programme import Branching, branched_programme
 from guidance.convex.clarabel_solver import SolveStatus
 from guidance.convex.constraint_set import ConstraintSet
@@ -28,7 +29,6 @@ from guidance.flight_time.time_window import forbidden_by
 from guidance.planning.convex_task import ConvexTask, bounds_hold
 from guidance.validation import finite_number, finite_vector
 
-Array = NDArray[np.float64]
 METHOD = "deferred decision"
 _MOST_REFINEMENTS = 4
 _LEAST_WEIGHT = 1e-2  # in the expected propellant, so that no branch is left without a price

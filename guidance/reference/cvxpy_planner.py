@@ -19,8 +19,8 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.descent.plan import Plan, PlanStatus
 from guidance.descent.problem import LandingProblem
 from guidance.descent.trajectory import Trajectory, no_trajectory
@@ -31,8 +31,6 @@ METHOD = "cvxpy"
 _LINEARISATIONS = 6
 _GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 _TIME_TOLERANCE = 2e-3  # relative; the optimum is flat in time
-
-Array = NDArray[np.float64]
 
 
 @lru_cache(maxsize=8)
