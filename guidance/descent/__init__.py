@@ -11,6 +11,7 @@ from guidance.exports import lazy_exports
 
 if TYPE_CHECKING:
     from guidance.descent.certificate import Certificate, Proof
+    from guidance.descent.dual_bound import DualBound, DualPiece
     from guidance.descent.plan import GuidanceError, InfeasibleError, Plan, PlanStatus, SolverFailedError
     from guidance.descent.problem import LandingProblem
     from guidance.descent.residuals import FLIGHT_TOLERANCE, FlightTolerance, Residuals
@@ -20,6 +21,10 @@ _HOMES = {
     "guidance.descent.certificate": (
         "Certificate",
         "Proof",
+    ),
+    "guidance.descent.dual_bound": (
+        "DualBound",
+        "DualPiece",
     ),
     "guidance.descent.plan": (
         "GuidanceError",
@@ -40,6 +45,8 @@ _HOMES = {
 __all__ = [
     "FLIGHT_TOLERANCE",
     "Certificate",
+    "DualBound",
+    "DualPiece",
     "FlightTolerance",
     "GuidanceError",
     "InfeasibleError",

@@ -1,44 +1,37 @@
-"""Why no flight exists: what a planner says, and how far its proof reaches."""
+"""What a planner proves of all flights: that there is none, or what none undercuts; and how far it reaches."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Protocol
 
 
 class Proof(Protocol):
-    """A proof for one time of flight, checked by code that shares nothing with the solver."""
-
-    @property
-    def time(self) -> float:
-        """[s] time of flight."""
-        ...
+    """A proof that is checked by code which shares nothing with what found it."""
 
     @property
     def verified(self) -> bool:
         """Whether the proof holds."""
         ...
 
-    @property
-    def causes(self) -> tuple[str, ...]:
-        """Limits that take part in the contradiction."""
-        ...
-
 
 @dataclass(frozen=True, eq=False)
 class Certificate:
-    """Why no flight exists, and how far the proof reaches.
+    """What is proved of all flights of a landing problem, and how far the proof reaches.
 
     Attributes:
         scope: in words, which times of flight and which mesh are covered, and by what.
-        causes: the limits that forbid the flight.
-        proofs: Farkas proofs (`guidance.convex.farkas`), one per time of flight; empty if closed-form bounds
-            alone decide.
+        causes: the limits that forbid every flight; empty where there are flights.
+        proofs: Farkas proofs (`guidance.convex.farkas`), one per time of flight, or a dual bound
+            (`guidance.descent.dual_bound`); empty if closed-form bounds alone decide.
+        lower_bound: [kg] no flight burns less; inf where there is none.
     """
 
     scope: str
     causes: tuple[str, ...]
     proofs: tuple[Proof, ...] = ()
+    lower_bound: float = math.inf
 
     @property
     def verified(self) -> bool:

@@ -47,7 +47,8 @@ class Plan:
         trajectory: the flight on N nodes (N - 1 intervals); empty where the status has none.
         landing_error: [m] distance from landing point to target; nan without a flight.
         message: the ending in words.
-        certificate: why no flight exists, where the status is INFEASIBLE (or NEAREST, if proved).
+        certificate: what is proved: why no flight exists, where the status is INFEASIBLE (or NEAREST, if
+            proved); what no flight undercuts, where it is OPTIMAL. None for plans of the closed loop.
         solves: conic (or nonlinear) programmes solved on the way, coarse ones and refinements included;
             those of proofs are not.
     """
@@ -113,6 +114,17 @@ class Plan:
     def propellant(self) -> float:
         """[kg] propellant that the plan burns; nan without a flight."""
         return float(self.mass[0] - self.mass[-1]) if self.mass.size else float("nan")
+
+    @property
+    def optimality_gap(self) -> float:
+        """[kg] what the plan burns above the proved lower bound; nan without a flight or a bound.
+
+        The bound leaves out the limits on the path (altitude, glide slope, speed): where they bind, the gap
+        holds their price too. `certificate.scope` says which times of flight it covers.
+        """
+        if self.status is not PlanStatus.OPTIMAL or self.certificate is None:
+            return float("nan")
+        return self.propellant - self.certificate.lower_bound
 
     def thrust_at(self, time: ArrayLike) -> Array:
         """Planned thrust; before the start that of the start, after the end none (engine cut-off).

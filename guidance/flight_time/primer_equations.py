@@ -122,7 +122,7 @@ def _admitted(x: Array, flow: float) -> bool:
 
 
 @compile_kernel
-def _solve_linear(matrix: Array, right: Array) -> bool:
+def solve_linear(matrix: Array, right: Array) -> bool:
     """Solve in place by elimination with row exchange; False where the matrix is singular."""
     size = right.size
     for k in range(size):
@@ -162,7 +162,7 @@ def _newton_step(x: Array, case: Array, here: Array, frame: Array) -> tuple[Arra
             jacobian[i, k] = (there[i] - here[i]) / step[k]
         step[k] = 0.0
     full = -here
-    found = _solve_linear(jacobian, full)
+    found = solve_linear(jacobian, full)
     return full, found and bool(np.isfinite(full).all())
 
 

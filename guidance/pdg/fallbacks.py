@@ -79,7 +79,19 @@ def answer(request: Request, unreachable: str) -> Plan:
         plan = answer_without_flight(plan, request, unreachable)
     if request.provisional:
         return plan
-    return within_limits(plan, lambda finer, found: _plan_again(request, finer, found))
+    return _bounded(within_limits(plan, lambda finer, found: _plan_again(request, finer, found)))
+
+
+def _bounded(plan: Plan) -> Plan:
+    """The plan with the proof of what no flight undercuts."""
+    if plan.status is not PlanStatus.OPTIMAL or plan.propellant <= 0.0:
+        return plan
+    from guidance.flight_time.primer_vector import find_primer_flight
+    from guidance.lower_bound.proof import prove_least_propellant
+
+    flight = find_primer_flight(plan.problem)
+    proof = prove_least_propellant(plan.problem, plan.propellant, plan.time_of_flight, flight)
+    return replace(plan, certificate=proof)
 
 
 def _plan_again(request: Request, nodes: int, found: Plan) -> Plan:

@@ -1,0 +1,68 @@
+"""What the dual bound must know of a landing problem, and the relaxation that it bounds.
+
+Let B(t) be the velocity change spent so far. The mass is m_0 exp(-B/c) with the exhaust velocity c, so that the
+thrust acceleration obeys T_min/m_0 exp(B/c) <= |u| <= T_max/m_0 exp(B/c). A flight that spends no more than J
+keeps
+
+    l (1 + B/c) <= |u| <= f (1 + kappa B),    l = T_min/m_0,  f = T_max/m_0,  kappa = (exp(J/c) - 1)/J,
+
+since exp lies above its tangent at 0 and below its chord over [0, J]. These bounds are linear in B, and what is
+proved of every flight that keeps them holds for every real flight that spends at most J. Limits on the path
+(altitude, glide slope, speed) are left out; the pointing limit is kept.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from guidance.arrays import Array
+from guidance.descent.problem import LandingProblem
+
+
+class DualCase(NamedTuple):
+    """The relaxed problem, in SI, as the kernels read it.
+
+    Attributes:
+        position: [m] shape (3,), the start seen from the target.
+        velocity: [m/s] shape (3,), at the start.
+        arrival: [m/s] shape (3,), velocity at the target.
+        gravity: [m/s^2] shape (3,).
+        full: [m/s^2] f, full thrust over start mass.
+        full_growth: [1/s] f kappa.
+        least: [m/s^2] l, least thrust over start mass.
+        least_growth: [1/s] l/c.
+        cosine: of the pointing limit; -1 where there is none.
+        sine: of the pointing limit; 0 where there is none.
+    """
+
+    position: Array
+    velocity: Array
+    arrival: Array
+    gravity: Array
+    full: float
+    full_growth: float
+    least: float
+    least_growth: float
+    cosine: float
+    sine: float
+
+
+def dual_case(problem: LandingProblem, most: float) -> DualCase:
+    """The relaxation for flights of a landing problem that spend at most `most` [m/s]."""
+    lander, mass = problem.lander, problem.state.mass
+    exhaust = lander.exhaust_velocity
+    full, least = lander.max_thrust / mass, lander.min_thrust / mass
+    limit = math.pi if lander.pointing_limit is None else lander.pointing_limit
+    return DualCase(
+        problem.offset,
+        problem.state.velocity,
+        problem.target_velocity,
+        problem.gravity,
+        full,
+        full * math.expm1(most / exhaust) / most,
+        least,
+        least / exhaust,
+        math.cos(limit),
+        math.sin(limit) if limit < math.pi else 0.0,
+    )

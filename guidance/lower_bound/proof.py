@@ -1,0 +1,110 @@
+"""Lower bounds on the propellant of a landing, over all times of flight, with their proofs."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from guidance.arrays import Array
+from guidance.descent.certificate import Certificate
+from guidance.descent.dual_bound import DualBound, DualPiece
+from guidance.descent.problem import LandingProblem
+from guidance.flight_time.primer_vector import PrimerFlight
+from guidance.lower_bound.dual_ascent import two_impulse_primer
+from guidance.lower_bound.dual_case import DualCase, dual_case
+from guidance.lower_bound.time_cover import CoverAim, TimeCover, cover_times
+
+_CELLS = 240  # of the grid of times, up to the time to begin with; as wide up to _UNIFORM of it
+_UNIFORM = 2.5
+_STRETCH = 1.02  # ratio of times beyond
+_LONGEST = 50.0  # times the first: the last one proved where no gravity ends the grid
+_FIRST_SCALE = 1.1  # of a unit primer at the switches: its thrust has to burn somewhere
+_CAUSES = ("maximum thrust", "propellant")
+GAP_TOLERANCE = 1e-6
+"""Share of the start mass that a bound may lie below the best one: 1.2 g of 1200 kg."""
+
+
+def prove_least_propellant(
+    problem: LandingProblem, propellant: float, time: float, flight: PrimerFlight | None = None
+) -> Certificate:
+    """Bound what any flight of a landing burns, in continuous time and over all times of flight.
+
+    The bound is tight (a few grams of the paper's 25 kg) where no limit on the path binds.
+
+    Args:
+        problem: the landing problem.
+        propellant: [kg] what a known flight burns.
+        time: [s] its time of flight.
+        flight: what the indirect method found, to begin with.
+    """
+    exhaust, mass = problem.lander.exhaust_velocity, problem.state.mass
+    most = -exhaust * math.log1p(-propellant / mass)
+    aim = CoverAim(most, GAP_TOLERANCE * exhaust, -math.inf)
+    bound, scope = _bound(problem, most, *_cover(problem, most, time, flight, aim))
+    return Certificate(scope, (), (bound,), bound.propellant)
+
+
+def prove_no_flight(problem: LandingProblem, time: float) -> Certificate | None:
+    """Proof that a full tank does not pay for any flight of a landing; None where this bound does not show it.
+
+    Args:
+        problem: the landing problem.
+        time: [s] a likely time of flight, to begin with.
+    """
+    exhaust = problem.lander.exhaust_velocity
+    most = exhaust * problem.log_mass_ratio
+    aim = CoverAim(most, GAP_TOLERANCE * exhaust, most)
+    times, cover = _cover(problem, most, time, None, aim)
+    if cover.level < most:
+        return None
+    bound, scope = _bound(problem, most, times, cover)
+    return Certificate(f"{scope}: dual bound on the propellant", _CAUSES, (bound,))
+
+
+def _cover(
+    problem: LandingProblem, most: float, time: float, flight: PrimerFlight | None, aim: CoverAim
+) -> tuple[Array, TimeCover]:
+    case = dual_case(problem, most)
+    times = _time_grid(case, most, time)
+    start = two_impulse_primer(time, case) if flight is None else _primer_of(flight)
+    return times, cover_times(times, case, start, time, aim)
+
+
+def _time_grid(case: DualCase, most: float, time: float) -> Array:
+    """[s] times of flight from 0 to the one beyond which gravity alone spends `most` [m/s]."""
+    pull = float(np.linalg.norm(case.gravity))
+    longest = _LONGEST * time
+    if pull > 0.0:
+        longest = (most + float(case.gravity @ (case.arrival - case.velocity)) / pull) / pull
+        longest = max(longest, time)
+    step = time / _CELLS
+    uniform = np.arange(0.0, min(_UNIFORM * time, longest), step)
+    if uniform[-1] + step >= longest:
+        return np.append(uniform, longest) if longest > uniform[-1] + 1e-6 * step else uniform
+    count = math.ceil(math.log(longest / uniform[-1]) / math.log(_STRETCH)) + 1
+    return np.concatenate([uniform[:-1], np.geomspace(uniform[-1], longest, count)])
+
+
+def _primer_of(flight: PrimerFlight) -> Array:
+    """(a, b) of a flight's primer, shape (6,)."""
+    begin, end = flight.primer_times
+    slope = (flight.primer[0] - flight.primer[1]) / (end - begin)
+    return _FIRST_SCALE * np.concatenate([flight.primer[1] - slope * (flight.time - end), slope])
+
+
+def _bound(
+    problem: LandingProblem, most: float, times: Array, cover: TimeCover
+) -> tuple[DualBound, str]:
+    """What a cover proves, and the times of flight that it speaks for, in words."""
+    starts = np.flatnonzero(np.diff(cover.owner, prepend=-1))
+    ends = np.append(times[starts[1:]], times[-1])
+    pieces = [
+        DualPiece(float(times[first]), float(end), cover.primers[cover.owner[first]])
+        for first, end in zip(starts, ends, strict=True)
+    ]
+    scope = f"every time of flight up to {times[-1]:.3g} s, in continuous time"
+    if problem.gravity.any():
+        pieces.append(DualPiece(float(times[-1]), math.inf, cover.primers[0]))
+        scope = "every time of flight, in continuous time"
+    return DualBound(problem, most, min(cover.level, most), tuple(pieces)), scope

@@ -1,0 +1,162 @@
+"""A bound for every time of flight: a few affine primers that together cover all of them.
+
+Each primer bounds the velocity change of every duration, tightly near the one that it is best for. Where the
+best bound of those found so far is lowest, the best primer of that time joins them; so do the constant primer
+against gravity, |w - v_0 - g T| <= J, which alone covers all times beyond the last of the grid.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from guidance.arrays import Array, Index
+from guidance.kernel import compile_kernel
+from guidance.lower_bound.dual_ascent import Ascent, ascend, dual_value, two_impulse_primer
+from guidance.lower_bound.dual_case import DualCase
+from guidance.lower_bound.dual_function import sweep_bound
+
+_FIRST_STRIDE = 5e-3  # of the time of flight
+_STRETCH = 1.7  # of the distance from the best time
+MOST_PRIMERS = 40
+"""A cover that needs more is given up as it stands."""
+
+
+class CoverAim(NamedTuple):
+    """What a cover is made for.
+
+    Attributes:
+        target: [m/s] the level that is enough.
+        tolerance: [m/s] how far below the best bound of the best time the level may lie.
+        floor: [m/s] give up where a time has no better bound than this.
+    """
+
+    target: float
+    tolerance: float
+    floor: float
+
+
+class TimeCover(NamedTuple):
+    """What a set of primers proves.
+
+    Attributes:
+        primers: (a, b) each, shape (k, 6); b in 1/s.
+        owner: index of the primer that bounds a cell of the grid of times, shape (n,).
+        level: [m/s] the least bound over all cells.
+        best_time: [s] a time of flight whose best bound is the least that was met.
+        best_value: [m/s] that bound.
+    """
+
+    primers: Array
+    owner: Index
+    level: float
+    best_time: float
+    best_value: float
+
+
+@compile_kernel
+def constant_primer(case: DualCase) -> Array:
+    """Primer (a, b), shape (6,), of unit length against gravity; zero where there is no gravity."""
+    primer = np.zeros(6)
+    size = math.sqrt(case.gravity @ case.gravity)
+    if size > 0.0:
+        primer[:3] = -case.gravity / size
+    return primer
+
+
+@compile_kernel
+def _better_start(known: Array, time: float, case: DualCase) -> Array:
+    """The primer to ascend from: one that is known, or that of two impulses."""
+    gradient = np.empty(6)
+    other = two_impulse_primer(time, case)
+    if dual_value(other, time, case, gradient) > dual_value(known, time, case, gradient):
+        return other
+    return known
+
+
+@compile_kernel
+def _next_stride(found: Ascent, time: float, stride: float, case: DualCase, tolerance: float) -> float:
+    """[s] step downhill to a time with a lower best bound; zero where the bound is as good as level there."""
+    gradient = np.empty(6)
+    half = 1e-4 * time
+    rise = dual_value(found.primer, time + half, case, gradient)
+    slope = (rise - dual_value(found.primer, time - half, case, gradient)) / (2.0 * half)
+    if abs(slope) * _FIRST_STRIDE * time < tolerance:
+        return 0.0
+    size = _FIRST_STRIDE * time if stride == 0.0 else (2.0 if stride * slope < 0.0 else 0.3) * abs(stride)
+    return -math.copysign(size, slope)
+
+
+@compile_kernel
+def _beyond(time: float, best_time: float, again: bool, times: Array) -> float:
+    """[s] the time whose primer is tried for a cell at `time`: further out it covers the cell and more."""
+    if again:
+        return time
+    return min(max(best_time + _STRETCH * (time - best_time), 0.5 * time), 0.5 * (time + times[-1]))
+
+
+@compile_kernel
+def _nearest_open_cell(envelope: Array, times: Array, level: float, best_time: float) -> int:
+    """The cell nearest to the best time whose bound lies below the level; -1 where there is none."""
+    nearest, least = -1, np.inf
+    for k in range(envelope.size):
+        away = abs(0.5 * (times[k] + times[k + 1]) - best_time)
+        if envelope[k] < level and away < least:
+            nearest, least = k, away
+    return nearest
+
+
+@compile_kernel
+def cover_times(
+    times: Array, case: DualCase, start: Array, near: float, aim: CoverAim
+) -> TimeCover:
+    """Find primers whose bounds lie above a level at every time of the grid.
+
+    The level is the aim's target or, where the best bound of a time is less, its tolerance below the least of
+    those best bounds.
+
+    Args:
+        times: [s] shape (n + 1,), rising from 0.
+        case: the relaxed problem.
+        start: (a, b), shape (6,), a primer for the time `near`.
+        near: [s] the time of flight to begin with.
+        aim: what level is enough.
+    """
+    cells = times.size - 1
+    primers, owner = np.empty((MOST_PRIMERS, 6)), np.zeros(cells, np.int64)
+    envelope, lowest = np.full(cells, -np.inf), np.empty(cells)
+    primers[0] = constant_primer(case)
+    sweep_bound(primers[0], times, case, envelope)
+    level, best_time, best_value = aim.target, near, np.inf
+    time, count, cell, again, stride = near, 1, -1, False, 0.0
+    known = start
+    while count < MOST_PRIMERS:
+        found = ascend(_better_start(known, time, case), time, case, 0.1 * aim.tolerance, 2.0 * aim.target)
+        better = found.value < best_value - aim.tolerance
+        if found.value < best_value:
+            best_value, best_time = found.value, time
+            level = min(aim.target, best_value - aim.tolerance)
+        primers[count] = found.primer
+        sweep_bound(found.primer, times, case, lowest)
+        for k in range(cells):
+            if lowest[k] > envelope[k]:
+                envelope[k], owner[k] = lowest[k], count
+        count += 1
+        if best_value < aim.floor:
+            break
+        if better:
+            stride = _next_stride(found, time, stride, case, aim.tolerance)
+            if stride != 0.0 and times[1] < time + stride < times[-1]:
+                time, known = time + stride, found.primer
+                continue
+        if again:  # the best primer of this cell is among them: more cannot be had of it
+            level = min(level, envelope[cell])
+        cell_before, cell = cell, _nearest_open_cell(envelope, times, level, best_time)
+        if cell < 0:
+            break
+        again = cell == cell_before
+        time = _beyond(0.5 * (times[cell] + times[cell + 1]), best_time, again, times)
+        known = primers[owner[cell]]
+    return TimeCover(primers[:count].copy(), owner, float(np.min(envelope)), best_time, best_value)
