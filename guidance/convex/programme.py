@@ -63,7 +63,7 @@ class ConvexSolution:
         return self.scaled.kappa * self.answer.primal[self.layout.log_mass]
 
     @property
-    def propellant_share(self) -> float:
+    def log_mass_ratio(self) -> float:
         """ln(start mass / final mass)."""
         return -float(self.log_mass[-1])
 
