@@ -19,6 +19,10 @@ if TYPE_CHECKING:
     from scipy.sparse import csc_matrix
 
 
+DEFAULT_TOLERANCE = 1e-8
+"""Gap and feasibility tolerance of a solve."""
+
+
 class SolveStatus(Enum):
     """How a conic solve ended."""
 
@@ -84,7 +88,7 @@ class ConicSolver:
         bound: Array,
         cost: Array,
         cones: tuple[tuple[str, int], ...],
-        tolerance: float = 1e-8,
+        tolerance: float = DEFAULT_TOLERANCE,
         refine: bool = False,
     ) -> None:
         """Assemble from nominal numbers, and solve them once.

@@ -85,7 +85,7 @@ def prove_free_time(task: ConvexTask, also: tuple[float, ...] = ()) -> Certifica
         if isinstance(proof, FarkasProof):
             proofs.append(proof)
             continue
-        if proof.solved and proof.propellant_share <= task.problem.log_mass_ratio:
+        if proof.solved and proof.log_mass_ratio <= task.problem.log_mass_ratio:
             return proof
         return None
     causes = tuple(dict.fromkeys(cause for proof in proofs for cause in proof.causes))

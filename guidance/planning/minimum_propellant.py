@@ -20,7 +20,7 @@ _COARSE_NODES = 13
 _NEAR_DEAD_TIME = 0.97  # first steps are small where the guess is good
 _STEPS_FROM_EDGE = (1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3)  # changes of a time that the true bounds refuse
 _COARSE_TOLERANCE = 20.0  # of a bracket's search on the coarse mesh: J has kinks where burns meet its nodes
-SHARE_TOLERANCE = 4e-6
+LOG_MASS_TOLERANCE = 4e-6
 """Gain in ln(mass) below which the time search stops: 5 g of propellant at 1200 kg."""
 
 
@@ -48,7 +48,7 @@ def _asymptote(task: ConvexTask) -> float:
 
 def minimise_over_time(
     task: ConvexTask,
-    tolerance: float = SHARE_TOLERANCE,
+    tolerance: float = LOG_MASS_TOLERANCE,
     guess: float | None = None,
     coarse_first: bool = True,
 ) -> TimeOutcome:
