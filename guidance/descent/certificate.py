@@ -1,4 +1,4 @@
-"""What a planner proves of all flights: that there is none, or what none undercuts; and how far it reaches."""
+"""What a planner proves of all flights: that there is none, or what none undercuts."""
 
 from __future__ import annotations
 

@@ -1,21 +1,20 @@
 """A lower bound on the propellant of every flight, and the check of its proof.
 
-The proof is a set of affine primers p(tau) = a + b tau (tau: time before the landing), each for a span of times
-of flight. For every flight of T seconds that spends at most J (see `DualBound.spent_at_most`)
+The proof is a set of affine primers p(tau) = a + b tau (tau: time before the landing), each for a span of
+times of flight. For every flight of T seconds that spends at most J (see `DualBound.spent_at_most`)
 
     J >= D(T) = a.(w - v_0 - g T) - b.(r_0 + v_0 T + g T^2/2) - int_0^T (f mu - l nu) dtau,
     mu = max(s, 0),  nu = max(-s, 0),  s = h(p) - 1 + f kappa int mu - (l/c) int nu,
 
-with f and l the greatest and least thrust over the start mass, c the exhaust velocity, kappa = (e^(J/c) - 1)/J and
-h(p) the greatest p.d over the directions that the engine may point along. The check integrates this in plain
-numpy and shares nothing with the search for the primers.
+with f and l the greatest and least thrust over the start mass, c the exhaust velocity, kappa =
+(e^(J/c) - 1)/J and h(p) the greatest p.d over the directions that the engine may point along; `guidance.lower_bound` derives
+it. The check integrates this in plain numpy and shares nothing with the search for the primers.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -47,7 +46,7 @@ class DualBound:
 
     Attributes:
         problem: the landing problem.
-        spent_at_most: [m/s] velocity change up to which the proof speaks: dearer flights are no better anyway.
+        spent_at_most: [m/s] J: the proof speaks of flights that spend no more; dearer ones are no better.
         bound: [m/s] no flight spends less, as claimed.
         pieces: the proof.
     """
@@ -63,12 +62,17 @@ class DualBound:
         state = self.problem.state
         return state.mass * -math.expm1(-self.bound / self.problem.lander.exhaust_velocity)
 
-    @cached_property
+    @property
     def verified(self) -> bool:
         """Whether the proof holds: the pieces follow one another, and each bounds all of its times."""
         ends = [piece.end for piece in self.pieces]
         begins = [piece.begin for piece in self.pieces]
-        if not self.pieces or begins[0] != 0.0 or begins[1:] != ends[:-1] or not self.bound <= self.spent_at_most:
+        if (
+            not self.pieces
+            or begins[0] != 0.0
+            or begins[1:] != ends[:-1]
+            or not self.bound <= self.spent_at_most
+        ):
             return False
         allowance = _ALLOWANCE * self.problem.lander.exhaust_velocity
         return bool(self._least_bounds().min() >= self.bound - allowance)

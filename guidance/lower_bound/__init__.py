@@ -1,8 +1,8 @@
 """What no flight can undercut: a lower bound on the propellant over all times of flight, with its proof.
 
-The bound is the dual function of a convex relaxation in continuous time, so it needs no solver and no mesh. The
-search for good dual variables (primers) is compiled; `guidance.descent.optimality` checks what it found by code
-of its own. Planners and `guidance.pdg` import this wing; it imports `guidance.descent` and
+The bound is the dual function of a convex relaxation in continuous time, so it needs no solver and no mesh.
+The search for good dual variables (primers) is compiled; `guidance.descent.dual_bound` checks what it found
+by code of its own. Planners and `guidance.pdg` import this wing; it imports `guidance.descent` and
 `guidance.flight_time`.
 """
 

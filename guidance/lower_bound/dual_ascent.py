@@ -134,7 +134,7 @@ def ascend(start: Array, time: float, case: DualCase, tolerance: float, enough: 
         if value > enough:
             break
         curvature = _curvature(primer, time, case, gradient)
-        better, promise = False, 0.0
+        better, promise, reached = False, 0.0, value
         for _ in range(20):
             matrix, step = curvature.copy(), gradient.copy()
             step[3:] /= time

@@ -1,20 +1,22 @@
 """What the dual bound must know of a landing problem, and the relaxation that it bounds.
 
-Let B(t) be the velocity change spent so far. The mass is m_0 exp(-B/c) with the exhaust velocity c, so that the
-thrust acceleration obeys T_min/m_0 exp(B/c) <= |u| <= T_max/m_0 exp(B/c). A flight that spends no more than J
-keeps
+Let B(t) be the velocity change spent so far. The mass is m_0 exp(-B/c) with the exhaust velocity c, so that
+the thrust acceleration obeys T_min/m_0 exp(B/c) <= |u| <= T_max/m_0 exp(B/c). A flight that spends no more
+than J keeps
 
     l (1 + B/c) <= |u| <= f (1 + kappa B),    l = T_min/m_0,  f = T_max/m_0,  kappa = (exp(J/c) - 1)/J,
 
-since exp lies above its tangent at 0 and below its chord over [0, J]. These bounds are linear in B, and what is
-proved of every flight that keeps them holds for every real flight that spends at most J. Limits on the path
-(altitude, glide slope, speed) are left out; the pointing limit is kept.
+since exp lies above its tangent at 0 and below its chord over [0, J]. These bounds are linear in B, and what
+is proved of every flight that keeps them holds for every real flight that spends at most J. Limits on the
+path (altitude, glide slope, speed) are left out; the pointing limit is kept.
 """
 
 from __future__ import annotations
 
 import math
 from typing import NamedTuple
+
+import numpy as np
 
 from guidance.arrays import Array
 from guidance.descent.problem import LandingProblem
@@ -55,10 +57,10 @@ def dual_case(problem: LandingProblem, most: float) -> DualCase:
     full, least = lander.max_thrust / mass, lander.min_thrust / mass
     limit = math.pi if lander.pointing_limit is None else lander.pointing_limit
     return DualCase(
-        problem.offset,
-        problem.state.velocity,
-        problem.target_velocity,
-        problem.gravity,
+        np.array(problem.offset),
+        np.array(problem.state.velocity),
+        np.array(problem.target_velocity),  # copies: kernels compile once for arrays that may be written
+        np.array(problem.gravity),
         full,
         full * math.expm1(most / exhaust) / most,
         least,

@@ -1,15 +1,15 @@
-"""The dual function: for any affine primer, a velocity change that no flight of a given duration can undercut.
+"""The dual function: for any affine primer, a velocity change that no flight of one duration can undercut.
 
 For every flight of T seconds to the target at the origin, and tau = T - t the time before the landing,
 
     int u = w - v_0 - g T,    int tau u = -(r_0 + v_0 T + g T^2/2),
 
-so that for any p(tau) = a + b tau, with h(p) the greatest p.d over the directions d that the engine may point,
+so that for any p(tau) = a + b tau, with h(p) the greatest p.d over the directions d that the engine may take,
 
     J = int |u| = a.(w - v_0 - g T) - b.(r_0 + v_0 T + g T^2/2) - int (p.u - |u|)
      >= a.(w - v_0 - g T) - b.(r_0 + v_0 T + g T^2/2) - int (h - 1) |u|.
 
-Multipliers mu of |u| <= f (1 + kappa B) and nu of |u| >= l (1 + B/c) bound the last integral by f M - l N, with
+Multipliers mu of |u| <= f (1 + kappa B) and nu of |u| >= l (1 + B/c) bound the last integral by f M - l N,
 
     s = h(p) - 1 + f kappa M - (l/c) N,   mu = max(s, 0),   nu = max(-s, 0),   M' = mu,   N' = nu   in tau.
 

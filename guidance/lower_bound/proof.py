@@ -46,7 +46,7 @@ def prove_least_propellant(
 
 
 def prove_no_flight(problem: LandingProblem, time: float) -> Certificate | None:
-    """Proof that a full tank does not pay for any flight of a landing; None where this bound does not show it.
+    """Proof that the tank does not pay for any flight of a landing; None where this bound does not show it.
 
     Args:
         problem: the landing problem.
@@ -93,9 +93,7 @@ def _primer_of(flight: PrimerFlight) -> Array:
     return _FIRST_SCALE * np.concatenate([flight.primer[1] - slope * (flight.time - end), slope])
 
 
-def _bound(
-    problem: LandingProblem, most: float, times: Array, cover: TimeCover
-) -> tuple[DualBound, str]:
+def _bound(problem: LandingProblem, most: float, times: Array, cover: TimeCover) -> tuple[DualBound, str]:
     """What a cover proves, and the times of flight that it speaks for, in words."""
     starts = np.flatnonzero(np.diff(cover.owner, prepend=-1))
     ends = np.append(times[starts[1:]], times[-1])

@@ -109,9 +109,7 @@ def _nearest_open_cell(envelope: Array, times: Array, level: float, best_time: f
 
 
 @compile_kernel
-def cover_times(
-    times: Array, case: DualCase, start: Array, near: float, aim: CoverAim
-) -> TimeCover:
+def cover_times(times: Array, case: DualCase, start: Array, near: float, aim: CoverAim) -> TimeCover:
     """Find primers whose bounds lie above a level at every time of the grid.
 
     The level is the aim's target or, where the best bound of a time is less, its tolerance below the least of

@@ -216,6 +216,8 @@ def answer_without_flight(plan: Plan, request: Request, unreachable: str) -> Pla
         anywhere = nearest.status is PlanStatus.INFEASIBLE
         if anywhere:
             plan = replace(nearest, method=plan.method)
+    if plan.certificate is not None:
+        return plan
     proof = prove_infeasible(problem, nodes, time_of_flight, anywhere)
     if isinstance(proof, Certificate):
         return _proved(plan, proof)

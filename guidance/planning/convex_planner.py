@@ -12,7 +12,7 @@ from guidance.descent.problem import LandingProblem
 from guidance.descent.trajectory import Trajectory
 from guidance.flight_time.time_window import forbidden_by
 from guidance.planning.convex_task import ConvexTask, relaxation_tight
-from guidance.planning.infeasibility import prove_fixed_time, prove_free_time
+from guidance.planning.infeasibility import prove_by_dual_bound, prove_fixed_time, prove_free_time
 from guidance.planning.minimum_propellant import (
     LOG_MASS_TOLERANCE,
     minimise_over_time,
@@ -21,6 +21,7 @@ from guidance.planning.minimum_propellant import (
 )
 
 METHOD = "convex"
+_OUT_OF_REACH = "propellant: every flight to the target burns more than is on board"
 _OVERDRAFT = 1e-9  # in ln(mass): rounding of the solver
 _REPLAN_TOLERANCE = 1.5e-5  # in ln(mass), as LOG_MASS_TOLERANCE: 18 g at 1200 kg
 _WORTH_A_SEARCH = 4e-5  # gain in ln(mass) that a time found with relaxed bounds may promise to another time
@@ -60,7 +61,8 @@ def plan_convex(
         provisional: whether a flight near the best time will do.
 
     Returns:
-        A plan that is OPTIMAL, or one without a flight: INFEASIBLE means "not found, proof still to come".
+        A plan that is OPTIMAL, or one without a flight: INFEASIBLE without a certificate means "not found,
+        proof still to come".
         Where relaxing lost something, the relaxed flight beside it.
     """
     task = ConvexTask(problem, nodes)
@@ -70,6 +72,10 @@ def plan_convex(
             return ConvexAnswer(Plan(PlanStatus.INFEASIBLE, problem, METHOD, message=cause))
         solution, solves = task.solve(time_of_flight), 1
     else:
+        proof = prove_by_dual_bound(problem)
+        if proof is not None:
+            none = Plan(PlanStatus.INFEASIBLE, problem, METHOD, message=_OUT_OF_REACH, certificate=proof)
+            return ConvexAnswer(none)
         tolerance = LOG_MASS_TOLERANCE if guess_time is None else _REPLAN_TOLERANCE
         outcome = minimise_over_time(task, tolerance, guess_time, coarse_first=guess_time is None)
         solution, solves = outcome.solution, outcome.solves

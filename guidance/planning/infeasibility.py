@@ -11,7 +11,10 @@ from guidance.convex.farkas import FarkasProof
 from guidance.convex.programme import ConvexSolution, convex_template
 from guidance.convex.scaling import scale_problem
 from guidance.descent.certificate import Certificate
-from guidance.flight_time.time_window import TimeWindow, forbidden_by, time_window
+from guidance.descent.problem import LandingProblem
+from guidance.flight_time.primer_vector import find_primer_flight
+from guidance.flight_time.time_window import TimeWindow, forbidden_by, guess_time, time_window
+from guidance.lower_bound.proof import prove_no_flight
 from guidance.planning.convex_task import ConvexTask
 
 
@@ -64,8 +67,21 @@ def prove_fixed_time(task: ConvexTask, time: float) -> Certificate | None:
     return Certificate(scope, proof.causes, (proof,))
 
 
+def prove_by_dual_bound(problem: LandingProblem) -> Certificate | None:
+    """Proof that the tank does not pay for any flight to the target; None where the bound does not show it.
+
+    It is not tried where the indirect method finds a flight.
+    """
+    window = time_window(problem)
+    if window.empty or find_primer_flight(problem) is not None:
+        return None
+    return prove_no_flight(problem, guess_time(problem, window))
+
+
 def prove_free_time(task: ConvexTask, also: tuple[float, ...] = ()) -> Certificate | ConvexSolution | None:
-    """Certificate for a free time of flight: closed-form bounds outside a window, Farkas proofs inside.
+    """Certificate for a free time of flight.
+
+    By the dual bound; else by closed-form bounds outside a window, and Farkas proofs inside.
 
     Args:
         task: what was to be solved.
@@ -78,6 +94,10 @@ def prove_free_time(task: ConvexTask, also: tuple[float, ...] = ()) -> Certifica
     window = time_window(task.problem, task.free_landing_point)
     if window.empty:
         return _closed_form(window)
+    if not task.free_landing_point:
+        proof = prove_by_dual_bound(task.problem)
+        if proof is not None:
+            return proof
     proofs = []
     times = np.union1d(window.grid(), np.array(also))
     for time in times:
