@@ -7,8 +7,9 @@ times of flight. For every flight of T seconds that spends at most J (see `DualB
     mu = max(s, 0),  nu = max(-s, 0),  s = h(p) - 1 + f kappa int mu - (l/c) int nu,
 
 with f and l the greatest and least thrust over the start mass, c the exhaust velocity, kappa =
-(e^(J/c) - 1)/J and h(p) the greatest p.d over the directions that the engine may point along; `guidance.lower_bound` derives
-it. The check integrates this in plain numpy and shares nothing with the search for the primers.
+(e^(J/c) - 1)/J and h(p) the greatest p.d over the directions that the engine may point along;
+`guidance.lower_bound` derives it. The check integrates this in plain numpy and shares nothing with the search
+for the primers.
 """
 
 from __future__ import annotations
@@ -49,12 +50,16 @@ class DualBound:
         spent_at_most: [m/s] J: the proof speaks of flights that spend no more; dearer ones are no better.
         bound: [m/s] no flight spends less, as claimed.
         pieces: the proof.
+        shortest: [s] the least time of flight that it speaks of.
+        longest: [s] the greatest one.
     """
 
     problem: LandingProblem
     spent_at_most: float
     bound: float
     pieces: tuple[DualPiece, ...]
+    shortest: float = 0.0
+    longest: float = math.inf
 
     @property
     def propellant(self) -> float:
@@ -65,14 +70,10 @@ class DualBound:
     @property
     def verified(self) -> bool:
         """Whether the proof holds: the pieces follow one another, and each bounds all of its times."""
-        ends = [piece.end for piece in self.pieces]
-        begins = [piece.begin for piece in self.pieces]
-        if (
-            not self.pieces
-            or begins[0] != 0.0
-            or begins[1:] != ends[:-1]
-            or not self.bound <= self.spent_at_most
-        ):
+        if not self.pieces or not self.bound <= self.spent_at_most:
+            return False
+        marks = [self.shortest, *(piece.end for piece in self.pieces)]
+        if marks[-1] != self.longest or marks[:-1] != [piece.begin for piece in self.pieces]:
             return False
         allowance = _ALLOWANCE * self.problem.lander.exhaust_velocity
         return bool(self._least_bounds().min() >= self.bound - allowance)
@@ -87,7 +88,8 @@ class DualBound:
         for k, piece in enumerate(self.pieces):
             inside = (marks >= piece.begin) & (marks <= piece.end)
             cells = inside[1:] & inside[:-1]
-            least[k] = np.where(cells, np.minimum(bounds[1:, k], bounds[:-1, k]) - sag[:, k], math.inf).min()
+            least[k] = min(bounds[inside, k].min(), np.where(cells, bounds[1:, k] - sag[:, k], math.inf).min())
+            least[k] = min(least[k], np.where(cells, bounds[:-1, k] - sag[:, k], math.inf).min())
             if math.isinf(piece.end) and not self._rises_for_ever(piece):
                 least[k] = -math.inf
         return least

@@ -35,10 +35,12 @@ class Ascent(NamedTuple):
     Attributes:
         primer: (a, b), shape (6,).
         value: [m/s] D there.
+        stalled: whether no step led higher, as at a kink of D.
     """
 
     primer: Array
     value: float
+    stalled: bool
 
 
 @compile_kernel
@@ -129,6 +131,7 @@ def ascend(start: Array, time: float, case: DualCase, tolerance: float, enough: 
     primer, trial = start.copy(), np.empty(6)
     gradient, there = np.empty(6), np.empty(6)
     value = dual_value(primer, time, case, gradient)
+    stalled = False
     damping, size = _LEAST_DAMPING, case.full * time
     for _ in range(_MOST_ITERATIONS):
         if value > enough:
@@ -151,9 +154,10 @@ def ascend(start: Array, time: float, case: DualCase, tolerance: float, enough: 
                     break
             damping *= 10.0
         if not better:
+            stalled = True
             break
         primer[:], gradient[:], value = trial, there, reached
         damping = max(0.01 * damping, _LEAST_DAMPING)
         if promise < tolerance and damping < _TRUSTED_DAMPING:
             break
-    return Ascent(primer, value)
+    return Ascent(primer, value, stalled)

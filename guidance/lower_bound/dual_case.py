@@ -62,7 +62,7 @@ def dual_case(problem: LandingProblem, most: float) -> DualCase:
         np.array(problem.target_velocity),  # copies: kernels compile once for arrays that may be written
         np.array(problem.gravity),
         full,
-        full * math.expm1(most / exhaust) / most,
+        full * (math.expm1(most / exhaust) / most if most > 0.0 else 1.0 / exhaust),
         least,
         least / exhaust,
         math.cos(limit),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,12 +12,14 @@ from guidance.descent.certificate import Certificate
 from guidance.descent.dual_bound import DualBound, DualPiece
 from guidance.descent.problem import LandingProblem
 from guidance.flight_time.primer_vector import PrimerFlight
-from guidance.lower_bound.dual_ascent import two_impulse_primer
+from guidance.lower_bound.dual_ascent import ascend, two_impulse_primer
 from guidance.lower_bound.dual_case import DualCase, dual_case
+from guidance.lower_bound.dual_function import sweep_bound
 from guidance.lower_bound.time_cover import CoverAim, TimeCover, cover_times
 
 _CELLS = 240  # of the grid of times, up to the time to begin with; as wide up to _UNIFORM of it
 _UNIFORM = 2.5
+_NEAR = np.array([0.02, 0.05, 0.1, 0.2, 0.35, 0.6])  # of a cell: there the least propellant may have a kink
 _STRETCH = 1.02  # ratio of times beyond
 _LONGEST = 50.0  # times the first: the last one proved where no gravity ends the grid
 _FIRST_SCALE = 1.1  # of a unit primer at the switches: its thrust has to burn somewhere
@@ -26,7 +29,11 @@ GAP_TOLERANCE = 1e-6
 
 
 def prove_least_propellant(
-    problem: LandingProblem, propellant: float, time: float, flight: PrimerFlight | None = None
+    problem: LandingProblem,
+    propellant: float,
+    time: float,
+    flight: PrimerFlight | None = None,
+    this_time_alone: bool = False,
 ) -> Certificate:
     """Bound what any flight of a landing burns, in continuous time and over all times of flight.
 
@@ -37,9 +44,13 @@ def prove_least_propellant(
         propellant: [kg] what a known flight burns.
         time: [s] its time of flight.
         flight: what the indirect method found, to begin with.
+        this_time_alone: bound the flights that last `time`, and no others.
     """
     exhaust, mass = problem.lander.exhaust_velocity, problem.state.mass
     most = -exhaust * math.log1p(-propellant / mass)
+    if this_time_alone:
+        bound = _bound_at(problem, most, time)
+        return Certificate(f"time of flight {time:g} s, in continuous time", (), (bound,), bound.propellant)
     aim = CoverAim(most, GAP_TOLERANCE * exhaust, -math.inf)
     bound, scope = _bound(problem, most, *_cover(problem, most, time, flight, aim))
     return Certificate(scope, (), (bound,), bound.propellant)
@@ -59,7 +70,18 @@ def prove_no_flight(problem: LandingProblem, time: float) -> Certificate | None:
     if cover.level < most:
         return None
     bound, scope = _bound(problem, most, times, cover)
-    return Certificate(f"{scope}: dual bound on the propellant", _CAUSES, (bound,))
+    causes = [name for name, without in _relaxed(problem) if prove_no_flight(without, time) is None]
+    return Certificate(f"{scope}: dual bound on the propellant", (*causes, *_CAUSES), (bound,))
+
+
+def _relaxed(problem: LandingProblem) -> list[tuple[str, LandingProblem]]:
+    """The problem without one of its limits on the thrust, and the name of that limit."""
+    lander, out = problem.lander, []
+    if lander.pointing_limit is not None:
+        out.append(("pointing", replace(problem, lander=replace(lander, pointing_limit=None))))
+    if lander.min_thrust > 0.0:
+        out.append(("minimum thrust", replace(problem, lander=replace(lander, min_thrust=0.0))))
+    return out
 
 
 def _cover(
@@ -71,6 +93,16 @@ def _cover(
     return times, cover_times(times, case, start, time, aim)
 
 
+def _bound_at(problem: LandingProblem, most: float, time: float) -> DualBound:
+    """What flights of one duration spend at least."""
+    case, lowest = dual_case(problem, most), np.empty(_CELLS)
+    tolerance = 0.1 * GAP_TOLERANCE * problem.lander.exhaust_velocity
+    found = ascend(two_impulse_primer(time, case), time, case, tolerance, 2.0 * most)
+    times = np.linspace(0.0, time, _CELLS + 1)
+    sweep_bound(found.primer, times, case, lowest)
+    return DualBound(problem, most, min(lowest[-1], most), (DualPiece(time, time, found.primer),), time, time)
+
+
 def _time_grid(case: DualCase, most: float, time: float) -> Array:
     """[s] times of flight from 0 to the one beyond which gravity alone spends `most` [m/s]."""
     pull = float(np.linalg.norm(case.gravity))
@@ -78,12 +110,14 @@ def _time_grid(case: DualCase, most: float, time: float) -> Array:
     if pull > 0.0:
         longest = (most + float(case.gravity @ (case.arrival - case.velocity)) / pull) / pull
         longest = max(longest, time)
-    step = time / _CELLS
-    uniform = np.arange(0.0, min(_UNIFORM * time, longest), step)
-    if uniform[-1] + step >= longest:
-        return np.append(uniform, longest) if longest > uniform[-1] + 1e-6 * step else uniform
-    count = math.ceil(math.log(longest / uniform[-1]) / math.log(_STRETCH)) + 1
-    return np.concatenate([uniform[:-1], np.geomspace(uniform[-1], longest, count)])
+    step, last = time / _CELLS, min(_UNIFORM * time, longest)
+    around = time + step * np.concatenate([-_NEAR, _NEAR])
+    times = np.concatenate([np.arange(0.0, last, step), around[around < last], [last]])
+    if longest > last:
+        count = math.ceil(math.log(longest / last) / math.log(_STRETCH)) + 1
+        times = np.concatenate([times, np.geomspace(last, longest, count)[1:]])
+    times = np.sort(times)
+    return times[np.diff(times, prepend=-step) > 1e-6 * step]
 
 
 def _primer_of(flight: PrimerFlight) -> Array:
@@ -105,4 +139,4 @@ def _bound(problem: LandingProblem, most: float, times: Array, cover: TimeCover)
     if problem.gravity.any():
         pieces.append(DualPiece(float(times[-1]), math.inf, cover.primers[0]))
         scope = "every time of flight, in continuous time"
-    return DualBound(problem, most, min(cover.level, most), tuple(pieces)), scope
+    return DualBound(problem, most, min(cover.level, most), tuple(pieces), longest=pieces[-1].end), scope

@@ -19,6 +19,7 @@ from guidance.lower_bound.dual_case import DualCase
 from guidance.lower_bound.dual_function import sweep_bound
 
 _FIRST_STRIDE = 5e-3  # of the time of flight
+_NUDGE = 0.03  # towards the primer of two impulses: one that is best at another time may lie on a kink of D
 _STRETCH = 1.7  # of the distance from the best time
 MOST_PRIMERS = 40
 """A cover that needs more is given up as it stands."""
@@ -67,13 +68,19 @@ def constant_primer(case: DualCase) -> Array:
 
 
 @compile_kernel
-def _better_start(known: Array, time: float, case: DualCase) -> Array:
-    """The primer to ascend from: one that is known, or that of two impulses."""
+def _best_primer(known: Array, time: float, case: DualCase, aim: CoverAim) -> Ascent:
+    """The best primer of a time, from one that is known or from that of two impulses."""
     gradient = np.empty(6)
-    other = two_impulse_primer(time, case)
-    if dual_value(other, time, case, gradient) > dual_value(known, time, case, gradient):
-        return other
-    return known
+    second = two_impulse_primer(time, case)
+    first = known + _NUDGE * (second - known)
+    if dual_value(second, time, case, gradient) > dual_value(first, time, case, gradient):
+        first, second = second, first
+    found = ascend(first, time, case, 0.1 * aim.tolerance, 2.0 * aim.target)
+    if found.stalled:
+        other = ascend(second, time, case, 0.1 * aim.tolerance, 2.0 * aim.target)
+        if other.value > found.value:
+            return other
+    return found
 
 
 @compile_kernel
@@ -131,7 +138,7 @@ def cover_times(times: Array, case: DualCase, start: Array, near: float, aim: Co
     time, count, cell, again, stride = near, 1, -1, False, 0.0
     known = start
     while count < MOST_PRIMERS:
-        found = ascend(_better_start(known, time, case), time, case, 0.1 * aim.tolerance, 2.0 * aim.target)
+        found = _best_primer(known, time, case, aim)
         better = found.value < best_value - aim.tolerance
         if found.value < best_value:
             best_value, best_time = found.value, time

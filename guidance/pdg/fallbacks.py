@@ -79,18 +79,20 @@ def answer(request: Request, unreachable: str) -> Plan:
         plan = answer_without_flight(plan, request, unreachable)
     if request.provisional:
         return plan
-    return _bounded(within_limits(plan, lambda finer, found: _plan_again(request, finer, found)))
+    plan = within_limits(plan, lambda finer, found: _plan_again(request, finer, found))
+    return _bounded(plan, this_time_alone=request.time_of_flight is not None)
 
 
-def _bounded(plan: Plan) -> Plan:
-    """The plan with the proof of what no flight undercuts."""
+def _bounded(plan: Plan, this_time_alone: bool) -> Plan:
+    """The plan with the proof of what no flight undercuts; of its duration, where that was asked for."""
     if plan.status is not PlanStatus.OPTIMAL or plan.propellant <= 0.0:
         return plan
     from guidance.flight_time.primer_vector import find_primer_flight
     from guidance.lower_bound.proof import prove_least_propellant
 
-    flight = find_primer_flight(plan.problem)
-    proof = prove_least_propellant(plan.problem, plan.propellant, plan.time_of_flight, flight)
+    problem, time = plan.problem, plan.time_of_flight
+    flight = None if this_time_alone else find_primer_flight(problem)
+    proof = prove_least_propellant(problem, plan.propellant, time, flight, this_time_alone)
     return replace(plan, certificate=proof)
 
 

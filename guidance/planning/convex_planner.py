@@ -21,7 +21,7 @@ from guidance.planning.minimum_propellant import (
 )
 
 METHOD = "convex"
-_OUT_OF_REACH = "propellant: every flight to the target burns more than is on board"
+_OUT_OF_REACH = "the thrust and the propellant on board do not suffice for any flight to the target"
 _OVERDRAFT = 1e-9  # in ln(mass): rounding of the solver
 _REPLAN_TOLERANCE = 1.5e-5  # in ln(mass), as LOG_MASS_TOLERANCE: 18 g at 1200 kg
 _WORTH_A_SEARCH = 4e-5  # gain in ln(mass) that a time found with relaxed bounds may promise to another time

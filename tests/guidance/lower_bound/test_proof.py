@@ -1,0 +1,189 @@
+"""Bounds over all times of flight: never above a flight, tight, and checked by code of their own."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from admissible_flights import random_flight
+from descents import GRAVITY, TARGET, paper_start
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import guidance
+from guidance import PAPER_LANDER, Lander, PlanStatus, State
+from guidance.descent.dual_bound import DualBound
+from guidance.descent.problem import LandingProblem
+from guidance.flight_time.primer_vector import find_primer_flight
+from guidance.lower_bound import prove_least_propellant, prove_no_flight
+
+GAP = 5e-3  # [kg] on the paper's descents
+REFERENCE_GRANTS = 2e-3  # [kg] what casadi's flight may save by its tolerances
+
+
+def paper_problem(rng):
+    return LandingProblem(State.parse(paper_start(rng)), TARGET, PAPER_LANDER, GRAVITY)
+
+
+def least_propellant(problem):
+    """[kg] of the indirect method's flight, and the flight."""
+    flight = find_primer_flight(problem)
+    assert flight is not None
+    return problem.state.mass * -math.expm1(-flight.log_mass_ratio), flight
+
+
+def test_the_gap_is_a_few_grams_on_every_paper_start():
+    rng = np.random.default_rng(17)
+    for k in range(500):
+        problem = paper_problem(rng)
+        propellant, flight = least_propellant(problem)
+        proof = prove_least_propellant(problem, propellant, flight.time, flight)
+        assert 0.0 <= propellant - proof.lower_bound < GAP
+        assert k % 25 or proof.verified
+
+
+def test_the_bound_needs_neither_the_best_flight_nor_the_indirect_method():
+    rng = np.random.default_rng(18)
+    for _ in range(20):
+        problem = paper_problem(rng)
+        propellant, flight = least_propellant(problem)
+        proof = prove_least_propellant(problem, propellant + 0.5, flight.time * rng.uniform(0.8, 1.3))
+        assert propellant - 2 * GAP < proof.lower_bound <= propellant
+        assert proof.verified
+
+
+def vertical_propellant(height, sink, lander, mass, pull):
+    """[kg] of the least-propellant vertical descent: free fall, then full thrust, by the rocket equation."""
+    c, flow = lander.exhaust_velocity, lander.max_mass_flow
+
+    def left_over(speed):
+        """[m] height left where the brakes, begun at this speed, have stopped the vehicle; and their time."""
+        low, high = 0.0, 0.999 * mass / flow
+        for _ in range(200):
+            time = 0.5 * (low + high)
+            gained = -c * math.log1p(-flow * time / mass) - pull * time
+            low, high = (time, high) if gained < speed else (low, time)
+        rest = 1.0 - flow * time / mass
+        braking = speed * time - c * (time + mass / flow * rest * math.log(rest)) + 0.5 * pull * time**2
+        return height - (speed**2 - sink**2) / (2.0 * pull) - braking, time
+
+    slow, fast = sink, math.sqrt(sink**2 + 2.0 * pull * height)
+    for _ in range(200):
+        speed = 0.5 * (slow + fast)
+        above, time = left_over(speed)
+        slow, fast = (speed, fast) if above > 0.0 else (slow, speed)
+    return flow * time
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.floats(100.0, 2000.0), st.floats(1.0, 60.0), st.floats(2.0, 7.0), st.floats(1.5, 10.0))
+def test_vertical_descents_are_bounded_to_their_closed_form(height, sink, thrust_to_weight, pull):
+    mass = 1200.0
+    lander = Lander(600.0, mass * pull * thrust_to_weight, 325.0)
+    lift = pull * (thrust_to_weight - 1.0)
+    if sink**2 > 1.8 * lift * height:
+        sink = math.sqrt(1.8 * lift * height)
+    start = State(np.array([0.0, 0.0, height]), np.array([0.0, 0.0, -sink]), mass)
+    problem = LandingProblem(start, np.zeros(3), lander, np.array([0.0, 0.0, -pull]))
+    best = vertical_propellant(height, sink, lander, mass, pull)
+    guess = sink / pull + math.sqrt(2.0 * height / pull)
+    proof = prove_least_propellant(problem, best * 1.01, guess)
+    assert proof.lower_bound <= best * (1.0 + 1e-7)
+    assert proof.lower_bound > best * (1.0 - 2e-3)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_no_admissible_flight_burns_less_or_is_proved_impossible(seed):
+    flight = random_flight(np.random.default_rng(seed))
+    problem = flight.problem
+    burnt = problem.state.mass * -math.expm1(-flight.spent / problem.lander.exhaust_velocity)
+    if burnt < 1e-6 * problem.state.mass:
+        return
+    proof = prove_least_propellant(problem, burnt, flight.time)
+    assert proof.lower_bound <= burnt
+    spare = replace(problem.lander, dry_mass=(problem.state.mass - burnt) * (1.0 - 1e-6))
+    assert prove_no_flight(replace(problem, lander=spare), flight.time) is None
+
+
+def test_the_tank_is_too_small_just_below_the_bound_and_never_above_a_flight():
+    rng = np.random.default_rng(19)
+    for _ in range(50):
+        problem = paper_problem(rng)
+        propellant, flight = least_propellant(problem)
+        bound = prove_least_propellant(problem, propellant, flight.time, flight).lower_bound
+        for content, proved in ((bound - 5e-3, True), (propellant + 1e-6, False)):
+            dry = replace(PAPER_LANDER, dry_mass=problem.state.mass - content)
+            proof = prove_no_flight(replace(problem, lander=dry), flight.time)
+            assert (proof is not None) == proved
+        assert proof is None
+
+
+def test_a_proof_is_verified_and_a_spoilt_one_is_not():
+    problem = paper_problem(np.random.default_rng(20))
+    propellant, flight = least_propellant(problem)
+    proof = prove_least_propellant(problem, propellant, flight.time, flight).proofs[0]
+    assert isinstance(proof, DualBound)
+    assert proof.verified
+    first, second, *rest = proof.pieces
+    spoilt = {
+        "claims more": replace(proof, bound=proof.bound + 0.01),
+        "more than it speaks of": replace(proof, spent_at_most=proof.bound - 0.01),
+        "a hole": replace(proof, pieces=(replace(first, end=first.end - 0.1), second, *rest)),
+        "no first time": replace(proof, pieces=(second, *rest)),
+        "one primer for all": replace(proof, pieces=(replace(first, end=second.end), *rest)),
+        "turned primer": replace(proof, pieces=(replace(first, primer=-first.primer), second, *rest)),
+        "for ever": replace(proof, pieces=(replace(first, end=math.inf),)),
+        "nothing": replace(proof, pieces=()),
+    }
+    for words, other in spoilt.items():
+        assert not other.verified, words
+
+
+def test_every_plan_that_is_called_optimal_carries_its_proof():
+    rng = np.random.default_rng(21)
+    for method in ("convex", "casadi", "cvxpy"):
+        plan = guidance.solve_pdg(paper_start(rng), TARGET, method=method)
+        assert plan.certificate is not None
+        assert plan.certificate.verified
+        assert -1e-3 < plan.optimality_gap < 0.05
+        assert "every time of flight" in plan.certificate.scope
+        assert plan.optimality_gap == plan.propellant - plan.certificate.lower_bound
+
+
+def test_more_nodes_close_the_gap():
+    start = paper_start(np.random.default_rng(22))
+    gaps = [guidance.solve_pdg(start, TARGET, nodes=nodes).optimality_gap for nodes in (21, 61, 241)]
+    assert gaps[0] > gaps[1] > gaps[2]
+    assert gaps[2] < GAP
+
+
+def test_a_plan_without_a_flight_has_no_gap():
+    plan = guidance.solve_pdg([200, 100, 950, -8, -4, -30, 1160], [900, 0, 50], throw=False)
+    assert plan.status is PlanStatus.INFEASIBLE
+    assert math.isnan(plan.optimality_gap)
+    assert plan.certificate is not None
+    assert plan.certificate.lower_bound == math.inf
+    assert plan.certificate.verified
+    assert plan.solves == 0
+
+
+def undercut(rng, count):
+    """[kg] by how much the nonconvex reference's flight comes below the bound, for each dispersed start."""
+    out = []
+    while len(out) < count:
+        start = [*rng.uniform(-500, 500, 2), rng.uniform(300, 1000), *rng.uniform(-30, 30, 2)]
+        start += [rng.uniform(-50, 5), 1200.0]
+        plan = guidance.solve_pdg(start, TARGET, method="casadi", throw=False)
+        if plan.status is PlanStatus.OPTIMAL:
+            out.append(-plan.optimality_gap)
+    return np.array(out)
+
+
+def test_the_nonconvex_reference_finds_nothing_below_the_bound():
+    assert undercut(np.random.default_rng(23), 30).max() < REFERENCE_GRANTS
+
+
+@pytest.mark.slow
+def test_the_nonconvex_reference_finds_nothing_below_the_bound_on_thousands_of_starts():
+    assert undercut(np.random.default_rng(24), 2000).max() < REFERENCE_GRANTS
