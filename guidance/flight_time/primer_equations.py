@@ -228,7 +228,7 @@ def _guess(problem: PrimerProblem, first_burn: bool, x: Extremal) -> bool:
     for axis in range(3):
         x.primer[0, axis], x.primer[1, axis] = q1[axis], q2[axis]
     x.times[0], x.times[1], x.times[2] = t1, t2, final
-    return abs(q1 @ q1 - 1.0) < _UNIT and abs(q2 @ q2 - 1.0) < _UNIT
+    return bool(abs(q1 @ q1 - 1.0) < _UNIT and abs(q2 @ q2 - 1.0) < _UNIT)
 
 
 @compile_kernel

@@ -41,7 +41,7 @@ def prove_at(task: ConvexTask, time: float) -> FarkasProof | ConvexSolution:
             if part.name == "propellant":
                 multipliers[first] += 1.0
             first += part.bound.size
-    proof = FarkasProof(time, rows, multipliers, scaled.reach)
+    proof = FarkasProof(time, rows, multipliers, scaled.unknown_bound)
     return proof if proof.verified else solution
 
 
