@@ -88,8 +88,8 @@ class DualBound:
         for k, piece in enumerate(self.pieces):
             inside = (marks >= piece.begin) & (marks <= piece.end)
             cells = inside[1:] & inside[:-1]
-            least[k] = min(bounds[inside, k].min(), np.where(cells, bounds[1:, k] - sag[:, k], math.inf).min())
-            least[k] = min(least[k], np.where(cells, bounds[:-1, k] - sag[:, k], math.inf).min())
+            lower = np.minimum(bounds[1:, k], bounds[:-1, k])[cells] - sag[cells, k]
+            least[k] = min(float(bounds[inside, k].min()), float(lower.min(initial=math.inf)))
             if math.isinf(piece.end) and not self._rises_for_ever(piece):
                 least[k] = -math.inf
         return least

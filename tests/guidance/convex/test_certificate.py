@@ -80,11 +80,13 @@ def test_proofs_survive_scaling_but_not_a_wider_bound():
 
 def test_free_time_names_its_scope():
     far = task(target=np.array([4000.0, 0.0, 50.0]))
-    certificate = prove_free_time(far)
-    assert isinstance(certificate, Certificate)
-    assert certificate.verified
-    assert "propellant" in certificate.causes
-    assert "Farkas" in certificate.scope or "closed-form" in certificate.scope
+    steep = replace(task(), problem=replace(task().problem, glide_slope_limit=0.1))
+    for asked, cause, words in ((far, "propellant", "dual bound"), (steep, "glide slope", "Farkas")):
+        certificate = prove_free_time(asked)
+        assert isinstance(certificate, Certificate)
+        assert certificate.verified
+        assert cause in certificate.causes
+        assert words in certificate.scope
 
 
 def test_error_carries_the_certificate_and_says_the_cause():
@@ -94,8 +96,8 @@ def test_error_carries_the_certificate_and_says_the_cause():
     assert plan.status is PlanStatus.INFEASIBLE
     assert plan.certificate is not None
     assert plan.certificate.verified
-    assert len(plan.certificate.proofs) >= 4
-    assert plan.certificate.scope.count("nodes") == 1
+    assert plan.certificate.proofs
+    assert "every time of flight" in plan.certificate.scope
 
 
 @pytest.mark.parametrize(

@@ -52,8 +52,8 @@ def test_the_bound_needs_neither_the_best_flight_nor_the_indirect_method():
         assert proof.verified
 
 
-def vertical_propellant(height, sink, lander, mass, pull):
-    """[kg] of the least-propellant vertical descent: free fall, then full thrust, by the rocket equation."""
+def vertical_descent(height, sink, lander, mass, pull):
+    """Propellant [kg] and time [s] of the least-propellant vertical descent: free fall, then full thrust, by the rocket equation."""
     c, flow = lander.exhaust_velocity, lander.max_mass_flow
 
     def left_over(speed):
@@ -72,7 +72,7 @@ def vertical_propellant(height, sink, lander, mass, pull):
         speed = 0.5 * (slow + fast)
         above, time = left_over(speed)
         slow, fast = (speed, fast) if above > 0.0 else (slow, speed)
-    return flow * time
+    return flow * time, (speed - sink) / pull + time
 
 
 @settings(max_examples=40, deadline=None)
@@ -85,11 +85,10 @@ def test_vertical_descents_are_bounded_to_their_closed_form(height, sink, thrust
         sink = math.sqrt(1.8 * lift * height)
     start = State(np.array([0.0, 0.0, height]), np.array([0.0, 0.0, -sink]), mass)
     problem = LandingProblem(start, np.zeros(3), lander, np.array([0.0, 0.0, -pull]))
-    best = vertical_propellant(height, sink, lander, mass, pull)
-    guess = sink / pull + math.sqrt(2.0 * height / pull)
-    proof = prove_least_propellant(problem, best * 1.01, guess)
-    assert proof.lower_bound <= best * (1.0 + 1e-7)
-    assert proof.lower_bound > best * (1.0 - 2e-3)
+    best, time = vertical_descent(height, sink, lander, mass, pull)
+    for share, guess, gap in ((1.0, time, 1e-3), (1.01, 1.2 * time, 1e-2)):
+        proof = prove_least_propellant(problem, best * share, guess)
+        assert best * (1.0 - gap) < proof.lower_bound <= best * (1.0 + 1e-7)
 
 
 @settings(max_examples=60, deadline=None)
@@ -149,6 +148,18 @@ def test_every_plan_that_is_called_optimal_carries_its_proof():
         assert -1e-3 < plan.optimality_gap < 0.05
         assert "every time of flight" in plan.certificate.scope
         assert plan.optimality_gap == plan.propellant - plan.certificate.lower_bound
+
+
+def test_a_plan_of_a_given_duration_is_bounded_for_that_duration():
+    start = paper_start(np.random.default_rng(25))
+    best = guidance.solve_pdg(start, TARGET)
+    for share in (0.9, 1.3):
+        plan = guidance.solve_pdg(start, TARGET, time_of_flight=share * best.time_of_flight)
+        assert plan.certificate is not None
+        assert plan.certificate.verified
+        assert "time of flight" in plan.certificate.scope
+        assert -1e-3 < plan.optimality_gap < 0.2
+        assert plan.certificate.lower_bound > best.propellant + 0.2
 
 
 def test_more_nodes_close_the_gap():
