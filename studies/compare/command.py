@@ -229,7 +229,12 @@ def write_results(folder: StudyFolder, study: Study, options: Comparison) -> lis
     provenance = describe_study(folder.study, folder.describe_flight())
     write_episodes(
         out,
-        (row for name in study.policies for chunk in folder.read_chunks((name,)) for row in chunk.rows[name]),
+        (
+            row
+            for name in study.policies
+            for chunk in folder.read_chunks((name,), checked=True)  # by the scores
+            for row in chunk.rows[name]
+        ),
     )
     write_table(out / "table.csv", summaries)
     write_markdown(out / "table.md", summaries)
