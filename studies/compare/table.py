@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from itertools import islice
 from pathlib import Path
 
-from studies.campaign.rows import ROW_COLUMNS, EpisodeRow
 from studies.campaign.score import (
     AT_LEAST_COLUMN,
     AT_LEAST_CONFIDENCE,
@@ -21,7 +19,6 @@ from studies.columns import (
     Column,
     Output,
     console_table,
-    file_number,
     format_p,
     markdown_lines,
     standing_in,
@@ -34,8 +31,6 @@ from studies.statistics.ratios import mcnemar_count_p_value
 
 REFERENCE_POLICY = "single-divert"
 """Every policy is compared with this one, on the same episodes."""
-
-_ROWS_AT_ONCE = 5000  # rows of a group of the Parquet file
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,28 +76,6 @@ def summarize_policy(score: PolicyScore, preset: str, privileged: bool, is_refer
         mcnemar_p=float("nan") if is_reference else mcnemar_count_p_value(score.pairs["safe_site"]),
         privileged=privileged,
     )
-
-
-def write_episodes(folder: Path, rows: Iterable[EpisodeRow]) -> None:
-    """Write rows as they come as episodes.csv and episodes.parquet; equal rows give equal CSV bytes."""
-    import pyarrow as pa
-    from pyarrow import parquet
-
-    kinds = {"str": pa.string(), "int": pa.int64(), "bool": pa.bool_(), "float": pa.float64()}
-    schema = pa.schema([(name, kinds[EpisodeRow.__annotations__[name]]) for name in ROW_COLUMNS])
-    with (
-        (folder / "episodes.csv").open("w", newline="") as stream,
-        parquet.ParquetWriter(folder / "episodes.parquet", schema) as tables,
-    ):
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(ROW_COLUMNS)
-        remaining = iter(rows)
-        while group := list(islice(remaining, _ROWS_AT_ONCE)):
-            for row in group:
-                values = (getattr(row, name) for name in ROW_COLUMNS)
-                writer.writerow([file_number(v) if isinstance(v, float) else v for v in values])
-            columns = {name: [getattr(row, name) for row in group] for name in ROW_COLUMNS}
-            tables.write_table(pa.table(columns, schema=schema))
 
 
 def write_timings(path: Path, decision_time: dict[str, DecisionTimes]) -> None:

@@ -28,7 +28,7 @@ from hda.task.scenario import sample_scenario
 from studies.campaign.command_line import choose_policies, open_folder, resumable
 from studies.campaign.monte_carlo import Study
 from studies.campaign.points import Point, fly_points
-from studies.campaign.provenance import describe_study, write_provenance
+from studies.campaign.provenance import describe_run, write_provenance
 from studies.campaign.run_options import RunOptions
 from studies.columns import write_csv, write_markdown
 from studies.failures.causes import explain_failure
@@ -124,7 +124,7 @@ def run_robustness(options: Robustness) -> list[Sweep]:
         breaks = find_breaks(factor.name, value, flown[_NOMINAL], others)
         sweeps.append(Sweep(factor, value, levels, hazard, breaks))
     write_sweeps(out, sweeps, studies, options)
-    write_provenance(out / "provenance.json", describe_study(own, {"points": [p.label for p in points]}))
+    write_provenance(out / "provenance.json", describe_run(options))
     return sweeps
 
 

@@ -26,7 +26,7 @@ from hda.task.scenario import sample_scenario
 from studies.campaign.command_line import choose_policies, open_folder, resumable
 from studies.campaign.monte_carlo import Study
 from studies.campaign.points import Point, Rows, fly_points
-from studies.campaign.provenance import describe_study, write_provenance
+from studies.campaign.provenance import describe_run, write_provenance
 from studies.campaign.run_options import RunOptions
 from studies.campaign.score import score_rows
 from studies.columns import write_csv, write_markdown
@@ -160,8 +160,7 @@ def run_trade_off(options: TradeOff) -> tuple[list[TradeOffRow], list[Bounds]]:
         from studies.trade_off.picture import draw_trade_off
 
         draw_trade_off(out / "trade-off.png", rows, bounds)
-    labels = [point.label for point in points]
-    write_provenance(out / "provenance.json", describe_study(points[0].study, {"points": labels}))
+    write_provenance(out / "provenance.json", describe_run(options))
     return rows, bounds
 
 
