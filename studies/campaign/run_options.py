@@ -17,18 +17,12 @@ class FolderOptions:
     """Options of a run that keeps finished work in a folder.
 
     Attributes:
-        workers: processes; changes nothing but the time.
         out: folder for results.
         resume: keep finished work of the same study in the folder, and do what is missing.
     """
 
-    workers: int = 2
     out: Path
     resume: bool = False
-
-    def __post_init__(self) -> None:
-        """Check every number."""
-        finite_number("workers", self.workers, at_least=1)
 
     @property
     def existing(self) -> Existing:
@@ -46,6 +40,7 @@ class RunOptions(FolderOptions):
         episodes: episodes per policy.
         study_seed: seed of the study; equal seeds give equal episodes.
         split: tile split: validation or fresh.
+        workers: processes; changes nothing but the time.
         figures: draw the figure.
     """
 
@@ -53,10 +48,11 @@ class RunOptions(FolderOptions):
     episodes: int
     study_seed: int = 0
     split: str = "validation"
+    workers: int = 2
     figures: bool = True
 
     def __post_init__(self) -> None:
         """Check every number."""
-        super().__post_init__()
         finite_number("episodes", self.episodes, at_least=1)
+        finite_number("workers", self.workers, at_least=1)
         finite_number("study_seed", self.study_seed, at_least=0)

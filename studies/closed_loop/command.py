@@ -44,6 +44,7 @@ class ClosedLoop(FolderOptions):
         margins: thrust margins.
         terminal_periods: control periods of the terminal phase.
         speed_limits: [m/s] greatest speeds.
+        workers: processes; changes nothing but the time.
     """
 
     sites: Literal["single-divert", "nearest-safe"] = "single-divert"
@@ -52,12 +53,13 @@ class ClosedLoop(FolderOptions):
     margins: tuple[float, ...] = (0.0, 0.05, 0.2)
     terminal_periods: tuple[int, ...] = (1, 2, 8)
     speed_limits: tuple[float, ...] = (50.0, 40.0, 35.0, 30.0)
+    workers: int = 2
     out: Path = Path("results/closed_loop")
 
     def __post_init__(self) -> None:
         """Check every number."""
-        super().__post_init__()
         finite_number("episodes", self.episodes, at_least=1)
+        finite_number("workers", self.workers, at_least=1)
 
 
 @dataclass(frozen=True)
