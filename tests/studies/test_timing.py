@@ -206,6 +206,8 @@ def test_study_writes_its_folder(tmp_path, monkeypatch, capsys, present: bool) -
         (m.name, "free" if m.free else "fixed", str(m.nodes)) for m in chosen
     ]
     assert (tmp_path / "out" / "timing.png").read_bytes().startswith(b"\x89PNG")
+    assert json.loads((tmp_path / "out" / "provenance.json").read_text())["options"]["starts"] == 1
+    assert (tmp_path / "out" / "timing.md").read_text().count("\n") == 2 + len(chosen)
     text = (tmp_path / "out" / "conclusions.txt").read_text()
     assert ("not installed" in text) == (not any(m.name == "gfold" for m in chosen))
     assert ("without it" in capsys.readouterr().out) == (not gfold_present())
