@@ -118,7 +118,7 @@ def least_safe_time(gains: Gains, period: float, phase_margin: float, gain_margi
     Raises:
         ValueError: the continuous loop itself lacks the phase margin.
     """
-    from scipy.optimize import bisect
+    from scipy.optimize import root_scalar
 
     if closed_margins(gains, 1.0).phase_margin <= phase_margin:
         raise ValueError(
@@ -135,8 +135,8 @@ def least_safe_time(gains: Gains, period: float, phase_margin: float, gain_margi
         low, high = high, 2.0 * high
     while spare(low) > 0.0:
         low *= 0.5
-    edge = float(bisect(spare, low, high, xtol=1e-15 * high, rtol=_EDGE))
-    return edge * (1.0 + 2.0 * _EDGE)  # on the side that keeps them
+    edge = root_scalar(spare, bracket=(low, high), method="bisect", xtol=1e-15 * high, rtol=_EDGE).root
+    return float(edge) * (1.0 + 2.0 * _EDGE)  # on the side that keeps them
 
 
 def stable_above(gains: Gains, period: float) -> float:
