@@ -12,8 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from studies.speed_ratios import FREE_TO_FIXED_LIMIT
+from studies.timing.gfold_peer import PEER_METHOD
 from studies.timing.measures import Call, Summary
-from studies.timing.methods import FATROP_METHOD, IPOPT_METHOD, PEER_NODES, Method
+from studies.timing.methods import FATROP_METHOD, IPOPT_METHOD, OWN_METHOD, PEER_NODES, Method
 
 PEER_BAR = 100.0
 """Least factor by which solve_pdg should beat gfold's free-time solve at 30 nodes."""
@@ -55,7 +56,7 @@ def compare_methods(calls: Sequence[Call], first: str, second: str) -> Compariso
 def conclude(methods: Sequence[Method], calls: Sequence[Call], summaries: Sequence[Summary]) -> list[str]:
     """The bars in words, met or not, on the starts drawn from the preset."""
     starts = [call for call in calls if call.drawn]
-    ours = {(m.nodes, m.free): m.label for m in methods if m.name == "solve_pdg"}
+    ours = {(m.nodes, m.free): m.label for m in methods if m.name == OWN_METHOD}
     meshes = sorted({nodes for nodes, _ in ours}, reverse=True)
     words = []
     for nodes in meshes:
@@ -66,7 +67,7 @@ def conclude(methods: Sequence[Method], calls: Sequence[Call], summaries: Sequen
             f"solves (medians; {found.paired:.2f} case by case); bar {FREE_TO_FIXED_LIMIT:g}: {met}."
         )
     words += _fatrop_against_ipopt(starts, {summary.method: summary for summary in summaries}, methods)
-    peers = [m for m in methods if m.name == "gfold" and m.free and m.nodes == PEER_NODES]
+    peers = [m for m in methods if m.name == PEER_METHOD and m.free and m.nodes == PEER_NODES]
     if not peers:
         words.append("gfold is not installed (extra `peers`): no comparison with it was made.")
     for peer in peers:
