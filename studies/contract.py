@@ -83,7 +83,7 @@ def _check_decisions(name: str, make: Callable[[], AnyPolicy], scenario: Scenari
 
 
 def _pilot(policy: AnyPolicy, scenario: Scenario) -> Policy[Any]:
-    return policy.informed(scenario.tile) if isinstance(policy, PrivilegedPolicy) else policy
+    return policy.informed(scenario) if isinstance(policy, PrivilegedPolicy) else policy
 
 
 def _checked(answer: object, where: str) -> tuple[Decision, Any]:

@@ -20,7 +20,7 @@ from hda.flight.vehicle import FlightErrors, FlightStatus, Segment, fly_interval
 from hda.policy import Decision, Policy, PrivilegedPolicy
 from hda.sensing.lidar import look
 from hda.task.observation import Observation
-from hda.task.scenario import Scenario
+from hda.task.scenario import Scenario, estimated_state, ground_point
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,22 +73,6 @@ def begin_flight(scenario: Scenario) -> Flight:
     target = scenario.nominal_target
     clock = upright_time_to_go(estimated_state(scenario, state), target, preset.lander, preset.gravity)
     return Flight(0, state, target, clock)
-
-
-def estimated_state(scenario: Scenario, state: State) -> State:
-    """The state as the lander estimates it: the true one plus the episode's navigation error."""
-    error = scenario.navigation_error
-    return State(state.position + error[:3], state.velocity + error[3:], state.mass)
-
-
-def ground_point(scenario: Scenario, site: NDArray[np.float64]) -> NDArray[np.float64]:
-    """[m] shape (3,), where a site in the frame of the estimated position really lies on the plane.
-
-    The lander points and places its looks relative to itself, so what it takes to be at `site` is off by the
-    horizontal error of its own position.
-    """
-    error = scenario.navigation_error
-    return site - np.array([error[0], error[1], 0.0])
 
 
 def observe(scenario: Scenario, flight: Flight) -> Observation:
@@ -166,7 +150,7 @@ def fly(policy: Policy[Any] | PrivilegedPolicy, scenario: Scenario) -> EpisodeRe
     """Fly one episode.
 
     Args:
-        policy: any policy; a privileged one is first given the true map.
+        policy: any policy; a privileged one is first given the scenario, with its true map.
         scenario: what to fly.
 
     Returns:
@@ -176,7 +160,7 @@ def fly(policy: Policy[Any] | PrivilegedPolicy, scenario: Scenario) -> EpisodeRe
         ValueError: the policy returns something that is not (Decision, memory), or a site off the target
             plane.
     """
-    pilot = policy.informed(scenario.tile) if isinstance(policy, PrivilegedPolicy) else policy
+    pilot = policy.informed(scenario) if isinstance(policy, PrivilegedPolicy) else policy
     memory = pilot.begin(scenario.view, scenario.streams.policy())
     flight = begin_flight(scenario)
     observations: list[Observation] = []

@@ -50,12 +50,11 @@ class AdjustedDescent:
             fresh = self.planned.command(observation, site, memory)
             if not possible or _is_cheaper(fresh[:2], shifted):
                 return fresh
-        periods = round(view.decision_interval / view.control_period)
         command = PlanCommand(shifted, tracking_gains(view.control_period, self.planned.weights))
         return (
             command,
             DecisionStatus.NOMINAL,
-            replace(memory, site=site.copy(), reference=shifted.after(periods)),
+            replace(memory, site=site.copy(), reference=shifted.after(view.control_periods)),
         )
 
 

@@ -234,9 +234,8 @@ class DeferredDecisionPolicy:
         self, reference: TrackingReference, site: Array, memory: DeferredDecisionMemory
     ) -> tuple[Decision, DeferredDecisionMemory]:
         view = memory.view
-        periods = round(view.decision_interval / view.control_period)
         command = PlanCommand(reference, tracking_gains(view.control_period, self.descent.planned.weights))
-        descent = replace(memory.descent, site=site.copy(), reference=reference.after(periods))
+        descent = replace(memory.descent, site=site.copy(), reference=reference.after(view.control_periods))
         return Decision(site, command, DecisionStatus.NOMINAL), replace(memory, descent=descent)
 
     def _fly_to(

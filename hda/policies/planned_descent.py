@@ -99,9 +99,8 @@ class PlannedDescent:
         self, reference: TrackingReference, status: DecisionStatus, memory: DescentMemory
     ) -> tuple[PlanCommand, DecisionStatus, DescentMemory]:
         view = memory.view
-        gains = tracking_gains(view.control_period, self.weights)
-        periods = round(view.decision_interval / view.control_period)
-        return PlanCommand(reference, gains), status, replace(memory, reference=reference.after(periods))
+        command = PlanCommand(reference, tracking_gains(view.control_period, self.weights))
+        return command, status, replace(memory, reference=reference.after(view.control_periods))
 
 
 @lru_cache(maxsize=8)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from guidance.lander import Lander
 from guidance.state import State
 from hda.sensing.lidar import Lidar
+from hda.task.rules import Rules
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,21 +22,30 @@ class ScenarioView:
         lander: the vehicle.
         gravity: [m/s^2] shape (3,).
         nominal_target: [m] shape (3,), the first target, on the target plane.
-        decision_interval: [s] time between looks.
-        control_period: [s] time over which a thrust is held.
-        field_of_view: [rad] the look's width is the slant range times its tangent.
-        off_nadir_limit: [rad] pixels further than this from the vertical read 0.
+        rules: timing, bounds of the dispersions, judgement.
         lidar: the sensor, with its known noise.
     """
 
     lander: Lander
     gravity: NDArray[np.float64]
     nominal_target: NDArray[np.float64]
-    decision_interval: float
-    control_period: float
-    field_of_view: float
-    off_nadir_limit: float
+    rules: Rules
     lidar: Lidar
+
+    @property
+    def decision_interval(self) -> float:
+        """[s] time between looks."""
+        return self.rules.decision_interval
+
+    @property
+    def control_period(self) -> float:
+        """[s] time over which a thrust is held."""
+        return self.rules.control_period
+
+    @property
+    def control_periods(self) -> int:
+        """Control periods between two looks."""
+        return self.rules.control_periods
 
 
 @dataclass(frozen=True, eq=False)

@@ -54,12 +54,25 @@ class Scenario:
             lander=self.preset.lander,
             gravity=np.array(self.preset.gravity),
             nominal_target=self.nominal_target.copy(),
-            decision_interval=self.preset.rules.decision_interval,
-            control_period=self.preset.rules.control_period,
-            field_of_view=self.preset.lidar.field_of_view,
-            off_nadir_limit=self.preset.lidar.off_nadir_limit,
+            rules=self.preset.rules,
             lidar=self.preset.lidar,
         )
+
+
+def estimated_state(scenario: Scenario, state: State) -> State:
+    """The state as the lander estimates it: the true one plus the episode's navigation error."""
+    error = scenario.navigation_error
+    return State(state.position + error[:3], state.velocity + error[3:], state.mass)
+
+
+def ground_point(scenario: Scenario, site: NDArray[np.float64]) -> NDArray[np.float64]:
+    """[m] shape (3,), where a site in the frame of the estimated position really lies on the plane.
+
+    The lander points and places its looks relative to itself, so what it takes to be at `site` is off by the
+    horizontal error of its own position.
+    """
+    error = scenario.navigation_error
+    return site - np.array([error[0], error[1], 0.0])
 
 
 def draw_target(

@@ -35,7 +35,7 @@ def nominal(name: str) -> ComposedPolicy:
 
 
 def privileged(name: str) -> PrivilegedComposition:
-    return PrivilegedComposition(name, OracleSite, FixedGainZemZev())
+    return PrivilegedComposition(name, OracleSite.informed, FixedGainZemZev())
 
 
 def test_the_policies_that_need_no_learning_are_registered():

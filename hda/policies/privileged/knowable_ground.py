@@ -31,8 +31,7 @@ from guidance.kernel import compile_kernel
 from guidance.state import State
 from hda.site_selection import Site
 from hda.task.observation import ScenarioView
-from hda.task.rules import Rules
-from hda.task.scenario import Scenario
+from hda.task.scenario import Scenario, ground_point
 
 Array = NDArray[np.float64]
 
@@ -161,8 +160,8 @@ class KnowableGround:
     """Where a flight could have landed softly on ground that it had seen; an outer bound.
 
     Attributes:
-        state: at the first look.
-        target: [m] shape (3,), centre of the first look, on the target plane.
+        state: the true one at the first look.
+        target: [m] shape (3,), where the centre of the first look truly lies on the target plane.
         width: [m] side of the first look.
         view: vehicle and sensor.
         soft_speed: [m/s] greatest vertical and horizontal speed of a soft touchdown.
@@ -172,7 +171,7 @@ class KnowableGround:
     target: Array
     width: float
     view: ScenarioView
-    soft_speed: float = Rules().soft_speed
+    soft_speed: float
 
     @property
     def budget(self) -> float:
@@ -191,7 +190,7 @@ class KnowableGround:
 
     def _holds(self, site: Array, looks: bool) -> bool:
         offset = np.asarray(site, dtype=np.float64) - self.state.position
-        slope = math.tan(self.view.off_nadir_limit)
+        slope = math.tan(self.view.lidar.off_nadir_limit)
         in_square = bool(np.abs(site[:2] - self.target[:2]).max() <= 0.5 * self.width + _CELL)
         near = math.hypot(offset[0], offset[1]) <= slope * -offset[2] + _CELL
         numbers = (-float(self.view.gravity[2]), self.budget, self.view.decision_interval, slope)
@@ -238,7 +237,8 @@ def _least_two_impulses(offsets: Array, velocity: Array, pull: float, longest: f
 
 def first_ground(scenario: Scenario) -> KnowableGround:
     """The knowable ground of an episode, at its start."""
-    preset, state, target = scenario.preset, scenario.initial_state, scenario.nominal_target
+    preset, state = scenario.preset, scenario.initial_state
+    target = ground_point(scenario, scenario.nominal_target)
     width = preset.lidar.width(state.position, target)
     return KnowableGround(state, target, width, scenario.view, preset.rules.soft_speed)
 

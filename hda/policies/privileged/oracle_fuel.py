@@ -13,6 +13,7 @@ from hda.policies.hazard_aware import load_kernels
 from hda.policies.privileged.oracle import safe_clearance
 from hda.site_selection import Site
 from hda.task.observation import Observation, ScenarioView
+from hda.task.scenario import Scenario
 
 _BLOCK = 8  # [m] side of the blocks that are priced by their middle first
 
@@ -66,6 +67,11 @@ class CheapestSafeSite:
 
     truth: Tile = field(repr=False)
     clearance: float = 2.0
+
+    @classmethod
+    def informed(cls, truth: Scenario) -> CheapestSafeSite:
+        """Make the selection that knows the tile of this scenario."""
+        return cls(truth.tile)
 
     def begin(self, view: ScenarioView) -> tuple[ScenarioView, Site | None]:
         """No site yet; the map of clearances is made here, once per tile."""
