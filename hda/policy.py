@@ -7,8 +7,8 @@ from enum import StrEnum
 from typing import TYPE_CHECKING, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.tracking.reference import TrackingReference
 from guidance.validation import finite_number, finite_vector
 from hda.task.observation import Observation, ScenarioView
@@ -93,7 +93,7 @@ class Decision:
         ValueError: the site is not three finite numbers.
     """
 
-    site: NDArray[np.float64]
+    site: Array
     command: Command
     status: DecisionStatus = DecisionStatus.NOMINAL
 

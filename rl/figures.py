@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 import tyro
-from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.console import tolerate_encoding
 
 if TYPE_CHECKING:
@@ -107,7 +107,7 @@ Command = (
 )
 
 
-def moving_average(values: NDArray[np.float64], window: int) -> NDArray[np.float64]:
+def moving_average(values: Array, window: int) -> Array:
     """Mean of the last `window` values, or of as many as there are."""
     total = np.cumsum(np.insert(values, 0, 0.0))
     ends = np.arange(1, len(values) + 1)

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.state import State
 from guidance.upright_time import upright_time_to_go
 from hda.flight.outcome import Outcome, RewardTerms, classify, score_step
@@ -38,7 +38,7 @@ class Flight:
 
     index: int
     state: State
-    target: NDArray[np.float64]
+    target: Array
     time_to_go: float
 
 
@@ -63,7 +63,7 @@ class Step:
     slant_angle: float
 
 
-def elevation_angle(position: NDArray[np.float64], target: NDArray[np.float64]) -> float:
+def elevation_angle(position: Array, target: Array) -> float:
     """[rad] elevation of `position` seen from `target` (both shape (3,)): 90 degrees is overhead."""
     offset = position - target
     return float(np.arctan2(offset[2], np.hypot(offset[0], offset[1])))

@@ -8,8 +8,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.dynamics import propagate_into
 from guidance.kernel import compile_kernel
 
@@ -30,12 +30,12 @@ def _fall_time(height: float, climb: float, pull: float) -> float:
 
 @compile_kernel
 def _lowest_instant(
-    start: NDArray[np.float64],
-    thrust: NDArray[np.float64],
+    start: Array,
+    thrust: Array,
     duration: float,
-    gravity: NDArray[np.float64],
+    gravity: Array,
     exhaust_velocity: float,
-    out: NDArray[np.float64],
+    out: Array,
 ) -> float:
     """When the vertical velocity, negative at the start and positive at the end, passes zero."""
     low = 0.0
@@ -52,13 +52,13 @@ def _lowest_instant(
 
 @compile_kernel
 def _hold(
-    start: NDArray[np.float64],
-    thrust: NDArray[np.float64],
+    start: Array,
+    thrust: Array,
     duration: float,
-    gravity: NDArray[np.float64],
+    gravity: Array,
     exhaust_velocity: float,
     plane: float,
-    out: NDArray[np.float64],
+    out: Array,
 ) -> tuple[float, bool]:
     """Hold a thrust for `duration`, or until the plane is crossed: (time flown, whether it was crossed)."""
     propagate_into(start, thrust, duration, gravity, exhaust_velocity, out)
@@ -86,10 +86,10 @@ def _hold(
 
 @compile_kernel
 def fall_to_plane(
-    start: NDArray[np.float64],
-    gravity: NDArray[np.float64],
+    start: Array,
+    gravity: Array,
     plane: float,
-    out: NDArray[np.float64],
+    out: Array,
 ) -> float:
     """Fall freely to the plane; return the time it took."""
     time = _fall_time(max(0.0, start[2] - plane), start[5], -gravity[2])
@@ -99,14 +99,14 @@ def fall_to_plane(
 
 @compile_kernel
 def hold_period(
-    start: NDArray[np.float64],
-    commanded: NDArray[np.float64],
+    start: Array,
+    commanded: Array,
     thrust_error: float,
     duration: float,
-    gravity: NDArray[np.float64],
+    gravity: Array,
     vehicle: VehicleNumbers,
     plane: float,
-    out: NDArray[np.float64],
+    out: Array,
 ) -> tuple[float, int]:
     """Apply a command for one period, ended early by the ground or the tank: (time flown, status)."""
     applied = commanded * (1.0 + thrust_error)

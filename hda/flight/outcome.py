@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.lander import Lander
 from guidance.state import State
 from hda.task.rules import Rules
@@ -46,7 +46,7 @@ class Outcome:
     """
 
     ending: Ending
-    touchdown: NDArray[np.float64]
+    touchdown: Array
     safe_site: bool
     success: bool
     miss_distance: float
@@ -57,7 +57,7 @@ class Outcome:
 def classify(
     initial: State,
     final: State,
-    target: NDArray[np.float64],
+    target: Array,
     ground: tuple[bool, bool, bool],
     vehicle: tuple[Lander, Rules],
 ) -> Outcome:

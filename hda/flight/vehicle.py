@@ -13,8 +13,8 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.kernel import compile_kernel
 from guidance.lander import Lander
 from guidance.state import State
@@ -24,7 +24,7 @@ from hda.flight import held_thrust
 from hda.flight.held_thrust import FLYING, TOUCHDOWN, VehicleNumbers, fall_to_plane, hold_period
 from hda.policy import Decision, ZemZevCommand
 
-_Log = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]  # time, path, commanded thrust
+_Log = tuple[Array, Array, Array]  # time, path, commanded thrust
 
 
 class FlightStatus(IntEnum):
@@ -48,7 +48,7 @@ class FlightErrors:
     """
 
     thrust: float = 0.0
-    navigation: NDArray[np.float64] = field(default_factory=lambda: np.zeros(6))
+    navigation: Array = field(default_factory=lambda: np.zeros(6))
 
 
 _LEAST_TELLING = 0.05  # [m/s^2] commanded acceleration under which the engine's error is not estimated
@@ -68,9 +68,9 @@ class Segment:
         pointing_limited: control periods in which the pointing limit changed the thrust.
     """
 
-    time: NDArray[np.float64]
-    path: NDArray[np.float64]
-    commanded: NDArray[np.float64]
+    time: Array
+    path: Array
+    commanded: Array
     time_to_go: float
     thrust_error: float
     status: FlightStatus
@@ -84,12 +84,12 @@ class Segment:
 
 @compile_kernel
 def _fly_zem_zev(
-    start: NDArray[np.float64],
-    site: NDArray[np.float64],
+    start: Array,
+    site: Array,
     gains: tuple[float, float],
     clock: tuple[float, float, float],
-    errors: tuple[float, NDArray[np.float64]],
-    gravity: NDArray[np.float64],
+    errors: tuple[float, Array],
+    gravity: Array,
     vehicle: VehicleNumbers,
     log: _Log,
 ) -> tuple[int, int, int]:
@@ -129,12 +129,12 @@ def _fly_zem_zev(
 
 @compile_kernel
 def _fly_plan(
-    start: NDArray[np.float64],
-    reference: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
+    start: Array,
+    reference: tuple[Array, Array, Array],
     gains: tuple[float, float],
     timing: tuple[float, float],
-    errors: tuple[float, NDArray[np.float64]],
-    gravity: NDArray[np.float64],
+    errors: tuple[float, Array],
+    gravity: Array,
     vehicle: VehicleNumbers,
     log: _Log,
 ) -> tuple[int, int, int]:
@@ -179,11 +179,11 @@ def _fly_plan(
 
 @compile_kernel
 def _estimate_error(
-    before: NDArray[np.float64],
-    after: NDArray[np.float64],
-    commanded: NDArray[np.float64],
+    before: Array,
+    after: Array,
+    commanded: Array,
     period: float,
-    gravity: NDArray[np.float64],
+    gravity: Array,
     estimate: float,
 ) -> float:
     """Engine's error ratio from one period's change of velocity; the old estimate where it hardly burnt."""
@@ -203,7 +203,7 @@ def fly_interval(
     state: State,
     decision: Decision,
     lander: Lander,
-    gravity: NDArray[np.float64],
+    gravity: Array,
     interval: tuple[float, int],
     errors: FlightErrors,
 ) -> Segment:

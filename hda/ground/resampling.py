@@ -16,6 +16,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from guidance.arrays import Array
+
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
@@ -58,7 +60,7 @@ def axis_weights(first_cell: int, cells: int, pixel_size: float, pixels: int) ->
 
 def _average_pairs(
     first_cell: int, cells: int, pixel_size: float, pixels: int
-) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float64]]:
+) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
     """Each pixel counts with the share of the cell that it covers."""
     reach = math.ceil(1.0 / pixel_size) + 1
     west = first_cell + np.arange(cells, dtype=np.float64)[:, None]
@@ -73,7 +75,7 @@ def _average_pairs(
 
 def _cubic_pairs(
     first_cell: int, cells: int, pixel_size: float, pixels: int
-) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float64]]:
+) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
     """Keys' kernel over the four nearest pixels; a pixel beyond the edge is the mirror 2 edge - inner."""
     place = (first_cell + np.arange(cells) + 0.5) / pixel_size - 0.5
     left = np.floor(place).astype(np.intp)
@@ -90,13 +92,13 @@ def _cubic_pairs(
     )
 
 
-def _keys(distance: NDArray[np.float64]) -> NDArray[np.float64]:
+def _keys(distance: Array) -> Array:
     near = (1.5 * distance - 2.5) * distance**2 + 1.0
     far = ((-0.5 * distance + 2.5) * distance - 4.0) * distance + 2.0
     return np.where(distance < 1.0, near, np.where(distance < 2.0, far, 0.0))
 
 
-def resample(heights: NDArray[np.float64], north: AxisWeights, east: AxisWeights) -> NDArray[np.float64]:
+def resample(heights: Array, north: AxisWeights, east: AxisWeights) -> Array:
     """Heights of the cells from those of the pixels that `north` and `east` ask for.
 
     Args:
@@ -114,5 +116,5 @@ def resample(heights: NDArray[np.float64], north: AxisWeights, east: AxisWeights
     return cells
 
 
-def _both_axes(values: NDArray[np.float64], north: csr_array, east: csr_array) -> NDArray[np.float64]:
+def _both_axes(values: Array, north: csr_array, east: csr_array) -> Array:
     return (east @ (north @ values).T).T

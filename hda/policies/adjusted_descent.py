@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.tracking.reference import TrackingReference
 from guidance.tracking.regulator import tracking_gains
 from guidance.tracking.retarget import shift_landing_point, velocity_change, within_pointing, within_thrust
@@ -37,7 +37,7 @@ class AdjustedDescent:
         return self.planned.begin(view)
 
     def command(
-        self, observation: Observation, site: NDArray[np.float64], memory: DescentMemory
+        self, observation: Observation, site: Array, memory: DescentMemory
     ) -> tuple[Command, DecisionStatus, DescentMemory]:
         """Shift the plan in flight, replan, or fly on."""
         left, view = memory.reference, memory.view

@@ -17,6 +17,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.kernel import compile_kernel
 from hda.sensing.lidar import Lidar
 from hda.task.observation import Observation
@@ -46,7 +47,7 @@ class SafetyBelief:
     looks: NDArray[np.uint16] = field(repr=False)
 
     @classmethod
-    def blank(cls, center: NDArray[np.float64], half_side: int) -> SafetyBelief:
+    def blank(cls, center: Array, half_side: int) -> SafetyBelief:
         """Nothing seen yet, over the cells within `half_side` [m] of `center` along each axis."""
         side = 2 * half_side
         corner = (math.floor(center[0]) - half_side, math.floor(center[1]) - half_side)
@@ -82,13 +83,13 @@ class SafetyBelief:
         _posterior_into(self.log_likelihood, self.looks, np.log(LEVEL_SHARES), out)
         return out
 
-    def cell(self, site: NDArray[np.float64]) -> tuple[int, int] | None:
+    def cell(self, site: Array) -> tuple[int, int] | None:
         """(row, column) of the cell under `site`, or None outside the square."""
         row, column = math.floor(site[1]) - self.corner[1], math.floor(site[0]) - self.corner[0]
         n = self.looks.shape[0]
         return (row, column) if 0 <= row < n and 0 <= column < n else None
 
-    def site(self, row: int, column: int, plane: float) -> NDArray[np.float64]:
+    def site(self, row: int, column: int, plane: float) -> Array:
         """[m] shape (3,), centre of a cell at the height of the target plane."""
         return np.array([self.corner[0] + column + 0.5, self.corner[1] + row + 0.5, plane])
 
@@ -108,9 +109,9 @@ def log_reading(value: float, level: float, deviation: float) -> float:
 def _fuse_into(
     safety_map: NDArray[np.float32],
     look: tuple[float, float, float],
-    position: NDArray[np.float64],
+    position: Array,
     sensor: tuple[float, float],
-    levels: NDArray[np.float64],
+    levels: Array,
     log_likelihood: NDArray[np.float32],
     looks: NDArray[np.uint16],
 ) -> None:
@@ -140,7 +141,7 @@ def _fuse_into(
 def _posterior_into(
     log_likelihood: NDArray[np.float32],
     looks: NDArray[np.uint16],
-    log_prior: NDArray[np.float64],
+    log_prior: Array,
     out: NDArray[np.float32],
 ) -> None:
     """Share of the posterior on the upper half of the levels, for the cells that were seen."""

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from hda.policy import Command, Decision, DecisionStatus, Policy
 from hda.site_selection import SiteSelection
 from hda.task.observation import Observation, ScenarioView
@@ -23,7 +23,7 @@ class GuidanceLaw(Protocol):
         ...
 
     def command(
-        self, observation: Observation, site: NDArray[np.float64], memory: Any
+        self, observation: Observation, site: Array, memory: Any
     ) -> tuple[Command, DecisionStatus, Any]:
         """Command for this decision, how it came about, and the memory for the next."""
         ...

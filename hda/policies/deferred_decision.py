@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.descent.plan import PlanStatus
 from guidance.planning.deferred_decision import DeferredDecision, plan_deferred
 from guidance.tracking.reference import TrackingReference
@@ -27,8 +28,6 @@ from hda.policies.site_price import HazardAwareWeights, landing_probability
 from hda.policies.surroundings import infer_unseen
 from hda.policy import Decision, DecisionStatus, PlanCommand
 from hda.task.observation import Observation, ScenarioView
-
-Array = NDArray[np.float64]
 
 _NEVER = 1e9  # [s] no later look counts in the ranking
 

@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.constants import MOON_GRAVITY
 from guidance.lander import Lander
 from guidance.state import State
@@ -28,8 +28,6 @@ from hda.policies.surroundings import infer_unseen
 from hda.sensing.lidar import Lidar
 from hda.task.observation import Observation, ScenarioView
 from hda.task.rules import Rules
-
-Array = NDArray[np.float64]
 
 _SQUARE = 1.25  # half side of the belief's square in widths of the first look
 

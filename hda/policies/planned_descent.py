@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.descent.plan import PlanStatus
 from guidance.lander import Lander
 from guidance.state import State
@@ -30,7 +30,7 @@ class DescentMemory:
     """
 
     view: ScenarioView
-    site: NDArray[np.float64] | None = None
+    site: Array | None = None
     reference: TrackingReference | None = None
 
 
@@ -57,7 +57,7 @@ class PlannedDescent:
         return DescentMemory(view)
 
     def command(
-        self, observation: Observation, site: NDArray[np.float64], memory: DescentMemory
+        self, observation: Observation, site: Array, memory: DescentMemory
     ) -> tuple[Command, DecisionStatus, DescentMemory]:
         """Replan, or fly on."""
         left = memory.reference
@@ -79,7 +79,7 @@ class PlannedDescent:
     def _plan(
         self,
         observation: Observation,
-        site: NDArray[np.float64],
+        site: Array,
         memory: DescentMemory,
         left: TrackingReference | None,
     ) -> SoftLanding | None:

@@ -21,13 +21,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.kernel import compile_kernel
 from guidance.two_impulse import divert_cost
 from guidance.validation import finite_number
 from hda.policies.belief import SafetyBelief
 from hda.task.observation import Observation, ScenarioView
-
-Array = NDArray[np.float64]
 
 LATTICE = 8
 """[m] spacing at which propellant is estimated; it bends over hundreds of metres."""
@@ -189,7 +188,7 @@ def _price_cells(
     propellant: Array,
     next_look: tuple[float, float, float, float, bool],
     weights: tuple[float, float, float, float, float],
-    out: NDArray[np.float64],
+    out: Array,
 ) -> None:
     """Fill J; see the module's docstring."""
     known_area, unknown_area = areas

@@ -15,6 +15,7 @@ import numba
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from guidance.arrays import Array
 from guidance.kernel import compile_parallel_kernel
 from guidance.validation import finite_number
 from hda.safety.criteria import DEFAULT_CRITERIA, SafetyCriteria
@@ -41,9 +42,9 @@ class SafetyMap:
     """
 
     deterministic: NDArray[np.bool_]
-    probability: NDArray[np.float64]
-    slope: NDArray[np.float64]
-    roughness: NDArray[np.float64]
+    probability: Array
+    slope: Array
+    roughness: Array
 
 
 def assess_safety(
@@ -98,7 +99,7 @@ def assess_safety(
     return SafetyMap(deterministic, probability, slope, roughness)
 
 
-def elevation_array(dem: ArrayLike) -> NDArray[np.float64]:
+def elevation_array(dem: ArrayLike) -> Array:
     """Copy a DEM as float64 [m], shape (m, n); NaN where it is NaN or masked.
 
     Raises:
@@ -161,8 +162,8 @@ def _known_sites(hole: NDArray[np.bool_], footprint: LanderFootprint) -> NDArray
 
 
 def _worst_case(
-    elevation: NDArray[np.float64], footprint: LanderFootprint, pixel_size: float, max_roughness: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    elevation: Array, footprint: LanderFootprint, pixel_size: float, max_roughness: float
+) -> tuple[Array, Array, Array]:
     """Worst slope [rad], roughness [m] and height above the plane less its limit [m] of each cell."""
     pad_map = elevation
     if footprint.pad_disc.size > 1:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.lander import Lander
 from guidance.state import State
 from hda.sensing.lidar import Lidar
@@ -27,8 +28,8 @@ class ScenarioView:
     """
 
     lander: Lander
-    gravity: NDArray[np.float64]
-    nominal_target: NDArray[np.float64]
+    gravity: Array
+    nominal_target: Array
     rules: Rules
     lidar: Lidar
 
@@ -65,7 +66,7 @@ class Observation:
     index: int
     time: float
     state: State
-    target: NDArray[np.float64]
+    target: Array
     safety_map: NDArray[np.float32]
     width: float
     time_to_go: float
@@ -81,12 +82,12 @@ class Observation:
         return self.width / self.safety_map.shape[0]
 
     @property
-    def pixel_offset(self) -> NDArray[np.float64]:
+    def pixel_offset(self) -> Array:
         """[m] shape (n,), offset of pixel i (north) or j (east) from the target: ((i + 1/2)/n - 1/2) w."""
         n = self.safety_map.shape[0]
         return ((np.arange(n) + 0.5) / n - 0.5) * self.width
 
-    def site(self, row: int, column: int) -> NDArray[np.float64]:
+    def site(self, row: int, column: int) -> Array:
         """[m] shape (3,), centre of pixel (row, column) on the target plane."""
         n = self.safety_map.shape[0]
         return np.array(
@@ -97,7 +98,7 @@ class Observation:
             ]
         )
 
-    def pixel(self, site: NDArray[np.float64]) -> tuple[int, int] | None:
+    def pixel(self, site: Array) -> tuple[int, int] | None:
         """(row, column) of the pixel that contains `site` (its x and y count), or None outside the look."""
         n = self.safety_map.shape[0]
         row = math.floor(((site[1] - self.target[1]) / self.width + 0.5) * n)

@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.state import State
 from hda.ground.library import Ground, load_tile, tile_numbers
 from hda.ground.tile import Tile
@@ -38,10 +38,10 @@ class Scenario:
     streams: EpisodeStreams
     tile: Tile
     initial_state: State
-    nominal_target: NDArray[np.float64]
+    nominal_target: Array
 
     @property
-    def navigation_error(self) -> NDArray[np.float64]:
+    def navigation_error(self) -> Array:
         """Estimated minus true position [m] and velocity [m/s], shape (6,)."""
         rules = self.preset.rules
         sigmas = rules.navigation_position_error, rules.navigation_velocity_error
@@ -65,7 +65,7 @@ def estimated_state(scenario: Scenario, state: State) -> State:
     return State(state.position + error[:3], state.velocity + error[3:], state.mass)
 
 
-def ground_point(scenario: Scenario, site: NDArray[np.float64]) -> NDArray[np.float64]:
+def ground_point(scenario: Scenario, site: Array) -> Array:
     """[m] shape (3,), where a site in the frame of the estimated position really lies on the plane.
 
     The lander points and places its looks relative to itself, so what it takes to be at `site` is off by the
@@ -75,9 +75,7 @@ def ground_point(scenario: Scenario, site: NDArray[np.float64]) -> NDArray[np.fl
     return site - np.array([error[0], error[1], 0.0])
 
 
-def draw_target(
-    tile: Tile, start: StartConditions, plane: float, rng: np.random.Generator
-) -> NDArray[np.float64]:
+def draw_target(tile: Tile, start: StartConditions, plane: float, rng: np.random.Generator) -> Array:
     """Draw the first target: uniform over the target area, where enough of the ground around is unsafe.
 
     Raises:
@@ -97,7 +95,7 @@ def draw_target(
     )
 
 
-def draw_state(target: NDArray[np.float64], start: StartConditions, rng: np.random.Generator) -> State:
+def draw_state(target: Array, start: StartConditions, rng: np.random.Generator) -> State:
     """Draw the initial state around `target`."""
     altitude = start.altitude.draw(rng)
     distance = start.distance.draw(rng)

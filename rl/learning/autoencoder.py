@@ -23,6 +23,7 @@ from hda.task.observation import Observation
 from hda.task.presets import Preset
 from hda.task.scenario import sample_scenario
 from rl.environment.action import decide_action
+from rl.inference.arrays import Array32
 from rl.inference.artefacts import Tensors
 from rl.inference.latent import LATENT_SIZE
 
@@ -171,7 +172,7 @@ class ReconstructionError:
 
 
 @torch.no_grad()
-def reconstruct(network: Autoencoder, maps: Maps) -> NDArray[np.float32]:
+def reconstruct(network: Autoencoder, maps: Maps) -> Array32:
     """Reconstructions of the maps, shape (n, 64, 64) in [0, 1]."""
     parts = []
     for first in range(0, len(maps), 512):

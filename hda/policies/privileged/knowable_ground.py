@@ -27,13 +27,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.kernel import compile_kernel
 from guidance.state import State
 from hda.site_selection import Site
 from hda.task.observation import ScenarioView
 from hda.task.scenario import Scenario, ground_point
-
-Array = NDArray[np.float64]
 
 _GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 _SECTIONS = 18  # of each golden section

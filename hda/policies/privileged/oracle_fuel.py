@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.two_impulse import divert_cost
 from hda.ground.tile import Tile
 from hda.policies.hazard_aware import load_kernels
@@ -29,7 +29,7 @@ def cheapest_clear_site(tile: Tile, observation: Observation, view: ScenarioView
     clear = room >= min(clearance, float(room.max()))
     plane = float(observation.target[2])
 
-    def price(south: float, west: float, count: tuple[int, ...], step: float) -> NDArray[np.float64]:
+    def price(south: float, west: float, count: tuple[int, ...], step: float) -> Array:
         rows, columns = (np.arange(number, dtype=np.float64) for number in count)
         east, north = west + step * columns, south + step * rows
         return divert_cost(observation.state, east, north, plane, view.lander, view.gravity)
