@@ -16,9 +16,9 @@ import numpy as np
 from guidance.arrays import Array
 from guidance.state import State
 from guidance.upright_time import upright_time_to_go
-from hda.flight.outcome import Outcome, RewardTerms, classify, score_step
+from hda.flight.outcome import Contact, Outcome, RewardTerms, classify, score_step
 from hda.flight.record import EpisodeRecord
-from hda.flight.vehicle import FlightErrors, FlightStatus, Segment, fly_interval
+from hda.flight.vehicle import ControlPeriods, FlightErrors, FlightStatus, Segment, fly_interval
 from hda.policy import Decision, Memory, Policy, PrivilegedPolicy
 from hda.sensing.lidar import look
 from hda.task.observation import Observation
@@ -117,7 +117,7 @@ def advance(scenario: Scenario, flight: Flight, decision: Decision) -> Step:
         decision,
         preset.lander,
         np.array(preset.gravity),
-        (rules.control_period, rules.control_periods),
+        ControlPeriods(rules.control_period, rules.control_periods),
         FlightErrors(
             scenario.streams.thrust_error(flight.index, rules.thrust_error), scenario.navigation_error
         ),
@@ -128,12 +128,12 @@ def advance(scenario: Scenario, flight: Flight, decision: Decision) -> Step:
     initial = scenario.initial_state
     outcome = None
     if landed or truncated:
-        ground = (
-            landed,
-            landed and scenario.tile.is_safe(after.state.position),
-            segment.status is FlightStatus.TANK_EMPTY,
+        contact = Contact(
+            landed=landed,
+            safe_cell=landed and scenario.tile.is_safe(after.state.position),
+            tank_empty=segment.status is FlightStatus.TANK_EMPTY,
         )
-        outcome = classify(initial, after.state, aims[1], ground, (preset.lander, rules))
+        outcome = classify(initial, after.state, aims[1], contact, preset.lander, rules)
     burnt = (flight.state.mass - after.state.mass) / (initial.mass - preset.lander.dry_mass)
     return Step(after, segment, outcome, truncated, score_step(burnt, outcome), slant)
 

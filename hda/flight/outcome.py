@@ -31,6 +31,21 @@ class Ending(StrEnum):
     """Still in flight after the last decision."""
 
 
+@dataclass(frozen=True)
+class Contact:
+    """How the plane was met.
+
+    Attributes:
+        landed: the plane was crossed.
+        safe_cell: the cell there is safe.
+        tank_empty: the tank ran dry before.
+    """
+
+    landed: bool
+    safe_cell: bool
+    tank_empty: bool
+
+
 @dataclass(frozen=True, eq=False)
 class Outcome:
     """What is known at the end of an episode.
@@ -58,8 +73,9 @@ def classify(
     initial: State,
     final: State,
     target: Array,
-    ground: tuple[bool, bool, bool],
-    vehicle: tuple[Lander, Rules],
+    contact: Contact,
+    lander: Lander,
+    rules: Rules,
 ) -> Outcome:
     """Judge the end of a flight.
 
@@ -67,18 +83,17 @@ def classify(
         initial: state at t = 0.
         final: state at the crossing of the plane, or after the last decision.
         target: [m] shape (3,), the last target.
-        ground: (the plane was crossed, the cell there is safe, the tank ran dry before).
-        vehicle: the lander, and the rules that set the speed limits.
+        contact: how the plane was met.
+        lander: the vehicle.
+        rules: they set the speed limits.
     """
-    landed, safe, empty = ground
-    lander, rules = vehicle
     speed = float(np.linalg.norm(final.velocity))
     horizontal = math.hypot(final.velocity[0], final.velocity[1])
     soft = abs(final.velocity[2]) <= rules.soft_speed and horizontal <= rules.soft_speed
-    safe_site = landed and safe
-    if not landed:
+    safe_site = contact.landed and contact.safe_cell
+    if not contact.landed:
         ending = Ending.TIMED_OUT
-    elif empty:
+    elif contact.tank_empty:
         ending = Ending.TANK_EMPTY
     elif speed > rules.crash_speed:
         ending = Ending.CRASH

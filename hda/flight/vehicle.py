@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import IntEnum
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,10 +22,58 @@ from guidance.state import State
 from guidance.thrust_limits import limit_into, pointing_angle
 from guidance.zem_zev import zem_zev_into
 from hda.flight import held_thrust
-from hda.flight.held_thrust import FLYING, TOUCHDOWN, VehicleNumbers, fall_to_plane, hold_period
+from hda.flight.held_thrust import (
+    FLYING,
+    TOUCHDOWN,
+    FlightConditions,
+    VehicleLimits,
+    fall_to_plane,
+    hold_period,
+)
 from hda.policy import Decision, ZemZevCommand
 
-_Log = tuple[Array, Array, Array]  # time, path, commanded thrust
+
+@dataclass(frozen=True)
+class ControlPeriods:
+    """Control periods between two looks.
+
+    Attributes:
+        period: [s] over which a thrust is held.
+        count: how many.
+    """
+
+    period: float
+    count: int
+
+
+class _Clock(NamedTuple):
+    """Time to go [s] at the decision, and how many seconds of it pass in one second."""
+
+    time_to_go: float
+    rate: float
+
+
+class _FeedbackGains(NamedTuple):
+    """On position and velocity: K_R and K_V of ZEM/ZEV, or [1/s^2] and [1/s] about a plan."""
+
+    position: float
+    velocity: float
+
+
+class _Reference(NamedTuple):
+    """What a plan asks for at the control instants: shapes (n, 3), (n, 3), (n - 1, 3)."""
+
+    position: Array
+    velocity: Array
+    acceleration: Array
+
+
+class _Log(NamedTuple):
+    """Where a kernel writes: shapes (m + 1,), (m + 1, 7), (m, 3)."""
+
+    time: Array
+    path: Array
+    commanded: Array
 
 
 class FlightStatus(IntEnum):
@@ -86,41 +135,33 @@ class Segment:
 def _fly_zem_zev(
     start: Array,
     site: Array,
-    gains: tuple[float, float],
-    clock: tuple[float, float, float],
-    errors: tuple[float, Array],
-    gravity: Array,
-    vehicle: VehicleNumbers,
+    gains: _FeedbackGains,
+    clock: _Clock,
+    conditions: FlightConditions,
     log: _Log,
 ) -> tuple[int, int, int]:
-    """Fly one interval; `clock` = (time to go, its rate, control period).
-
-    Returns (nodes written, status, control periods in which the pointing limit acted).
-    """
+    """Fly one interval: (nodes written, status, control periods in which the pointing limit acted)."""
     time, path, commanded = log
-    time_to_go, rate, period = clock
-    thrust_error, navigation = errors
+    period, gravity, vehicle = conditions.period, conditions.gravity, conditions.vehicle
     seen = start.copy()
     limited = 0
     periods = commanded.shape[0] - 1
     path[0] = start
     time[0] = 0.0
     for k in range(periods + 1):
-        remaining = time_to_go - rate * period * k
+        remaining = clock.time_to_go - clock.rate * period * k
         if remaining <= 0.5 * period:
             commanded[k] = 0.0
-            time[k + 1] = time[k] + fall_to_plane(path[k], gravity, site[2], path[k + 1])
+            time[k + 1] = time[k] + fall_to_plane(path[k], gravity, conditions.plane, path[k + 1])
             return k + 2, TOUCHDOWN, limited
         if k == periods:
             break
-        seen[:6] = path[k, :6] + navigation
+        seen[:6] = path[k, :6] + conditions.navigation_error
         zem_zev_into(seen, site, gains, remaining, gravity, commanded[k])
         commanded[k] *= path[k, 6]
-        if limit_into(commanded[k], vehicle[0], vehicle[1], vehicle[4]):
+        if limit_into(commanded[k], vehicle.min_thrust, vehicle.max_thrust, vehicle.pointing_limit):
             limited += 1
-        flown, status = hold_period(
-            path[k], commanded[k], thrust_error, period, gravity, vehicle, site[2], path[k + 1]
-        )
+        flown, status = hold_period(path[k], commanded[k], conditions, path[k + 1])
         time[k + 1] = time[k] + flown
         if status != FLYING:
             return k + 2, status, limited
@@ -130,46 +171,42 @@ def _fly_zem_zev(
 @compile_kernel
 def _fly_plan(
     start: Array,
-    reference: tuple[Array, Array, Array],
-    gains: tuple[float, float],
-    timing: tuple[float, float],
-    errors: tuple[float, Array],
-    gravity: Array,
-    vehicle: VehicleNumbers,
+    reference: _Reference,
+    gains: _FeedbackGains,
+    conditions: FlightConditions,
     log: _Log,
 ) -> tuple[int, int, int]:
-    """Track a reference for one interval; `timing` = (control period, plane). Returns as `_fly_zem_zev`.
+    """Track a reference for one interval; returns as `_fly_zem_zev`.
 
     The engine's error ratio is unknown at the start of the interval; once a period has been flown it is known
     from the change of velocity, which is compared with what the command should have given.
     """
     time, path, commanded = log
-    position, velocity, feedforward = reference
-    period, plane = timing
-    thrust_error, navigation = errors
+    period, gravity, vehicle = conditions.period, conditions.gravity, conditions.vehicle
+    navigation = conditions.navigation_error
     periods = commanded.shape[0] - 1
-    left = feedforward.shape[0]
+    planned = reference.acceleration.shape[0]
     estimate = 0.0
     limited = 0
     path[0] = start
     time[0] = 0.0
     for k in range(periods + 1):
-        if k >= left:
+        if k >= planned:
             commanded[k] = 0.0
-            time[k + 1] = time[k] + fall_to_plane(path[k], gravity, plane, path[k + 1])
+            time[k + 1] = time[k] + fall_to_plane(path[k], gravity, conditions.plane, path[k + 1])
             return k + 2, TOUCHDOWN, limited
         if k == periods:
             break
         for axis in range(3):
-            push = feedforward[k, axis]
-            push -= gains[0] * (path[k, axis] + navigation[axis] - position[k, axis])
-            push -= gains[1] * (path[k, 3 + axis] + navigation[3 + axis] - velocity[k, axis])
-            commanded[k, axis] = path[k, 6] * push / (1.0 + estimate)
-        if limit_into(commanded[k], vehicle[0], vehicle[1], vehicle[4]):
+            miss = path[k, axis] + navigation[axis] - reference.position[k, axis]
+            drift = path[k, 3 + axis] + navigation[3 + axis] - reference.velocity[k, axis]
+            acceleration = reference.acceleration[k, axis]
+            acceleration -= gains.position * miss
+            acceleration -= gains.velocity * drift
+            commanded[k, axis] = path[k, 6] * acceleration / (1.0 + estimate)
+        if limit_into(commanded[k], vehicle.min_thrust, vehicle.max_thrust, vehicle.pointing_limit):
             limited += 1
-        flown, status = hold_period(
-            path[k], commanded[k], thrust_error, period, gravity, vehicle, plane, path[k + 1]
-        )
+        flown, status = hold_period(path[k], commanded[k], conditions, path[k + 1])
         time[k + 1] = time[k] + flown
         if status != FLYING:
             return k + 2, status, limited
@@ -204,7 +241,7 @@ def fly_interval(
     decision: Decision,
     lander: Lander,
     gravity: Array,
-    interval: tuple[float, int],
+    interval: ControlPeriods,
     errors: FlightErrors,
 ) -> Segment:
     """Fly a decision until the next look or the ground.
@@ -214,7 +251,7 @@ def fly_interval(
         decision: site and command.
         lander: the vehicle, which limits the thrust.
         gravity: [m/s^2] shape (3,), pointing down.
-        interval: (control period [s], control periods to the next look).
+        interval: control periods to the next look.
         errors: of the applied thrust and of the estimated state over this interval.
 
     Returns:
@@ -223,36 +260,35 @@ def fly_interval(
     Raises:
         ValueError: a plan was sampled at another control period than the vehicle's.
     """
-    period, periods = interval
-    time, path, commanded = np.empty(periods + 2), np.empty((periods + 2, 7)), np.empty((periods + 1, 3))
-    vehicle = (
+    periods = interval.count
+    log = _Log(np.empty(periods + 2), np.empty((periods + 2, 7)), np.empty((periods + 1, 3)))
+    vehicle = VehicleLimits(
         lander.min_thrust,
         lander.max_thrust,
         lander.exhaust_velocity,
         lander.dry_mass,
         pointing_angle(lander),
     )
-    start, log, command = state.as_array(), (time, path, commanded), decision.command
-    drawn = (errors.thrust, errors.navigation)
+    conditions = FlightConditions(
+        interval.period, float(decision.site[2]), gravity, vehicle, errors.thrust, errors.navigation
+    )
+    start, command = state.as_array(), decision.command
     if isinstance(command, ZemZevCommand):
-        gains = (command.position_gain, command.velocity_gain)
-        clock = (command.time_to_go, command.time_to_go_rate, period)
-        nodes, status, limited = _fly_zem_zev(
-            start, decision.site, gains, clock, drawn, gravity, vehicle, log
-        )
-        left = command.time_to_go - command.time_to_go_rate * float(time[nodes - 1])
+        gains = _FeedbackGains(command.position_gain, command.velocity_gain)
+        clock = _Clock(command.time_to_go, command.time_to_go_rate)
+        nodes, status, limited = _fly_zem_zev(start, decision.site, gains, clock, conditions, log)
+        time_to_go = command.time_to_go - command.time_to_go_rate * float(log.time[nodes - 1])
     else:
         reference = command.reference
-        _check_period(reference.control_period, period)
-        parts = (reference.position, reference.velocity, reference.thrust_acceleration)
-        timing = (period, float(decision.site[2]))
-        nodes, status, limited = _fly_plan(start, parts, command.gains, timing, drawn, gravity, vehicle, log)
-        left = reference.duration - float(time[nodes - 1])
+        _check_period(reference.control_period, interval.period)
+        asked = _Reference(reference.position, reference.velocity, reference.thrust_acceleration)
+        nodes, status, limited = _fly_plan(start, asked, _FeedbackGains(*command.gains), conditions, log)
+        time_to_go = reference.duration - float(log.time[nodes - 1])
     return Segment(
-        time=time[:nodes],
-        path=path[:nodes],
-        commanded=commanded[: nodes - 1],
-        time_to_go=left,
+        time=log.time[:nodes],
+        path=log.path[:nodes],
+        commanded=log.commanded[: nodes - 1],
+        time_to_go=time_to_go,
         thrust_error=errors.thrust,
         status=FlightStatus(status),
         pointing_limited=limited,

@@ -62,15 +62,15 @@ def _average_pairs(
     first_cell: int, cells: int, pixel_size: float, pixels: int
 ) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
     """Each pixel counts with the share of the cell that it covers."""
-    reach = math.ceil(1.0 / pixel_size) + 1
+    across = math.ceil(1.0 / pixel_size) + 1
     west = first_cell + np.arange(cells, dtype=np.float64)[:, None]
-    pixel = np.floor(west / pixel_size).astype(np.intp) + np.arange(reach)
+    pixel = np.floor(west / pixel_size).astype(np.intp) + np.arange(across)
     begin, end = np.maximum(pixel * pixel_size, west), np.minimum((pixel + 1) * pixel_size, west + 1.0)
-    share = np.clip(end - begin, 0.0, None)
-    share[(share < 1e-9) | (pixel >= pixels)] = 0.0  # rounding at the edges of pixels
-    share /= share.sum(axis=1, keepdims=True)
+    weight = np.clip(end - begin, 0.0, None)
+    weight[(weight < 1e-9) | (pixel >= pixels)] = 0.0  # rounding at the edges of pixels
+    weight /= weight.sum(axis=1, keepdims=True)
     cell = np.broadcast_to(np.arange(cells)[:, None], pixel.shape)
-    return cell.ravel(), np.minimum(pixel, pixels - 1).ravel(), share.ravel()
+    return cell.ravel(), np.minimum(pixel, pixels - 1).ravel(), weight.ravel()
 
 
 def _cubic_pairs(
@@ -78,8 +78,8 @@ def _cubic_pairs(
 ) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
     """Keys' kernel over the four nearest pixels; a pixel beyond the edge is the mirror 2 edge - inner."""
     place = (first_cell + np.arange(cells) + 0.5) / pixel_size - 0.5
-    left = np.floor(place).astype(np.intp)
-    pixel = left[:, None] + np.arange(-1, 3)
+    nearest = np.floor(place).astype(np.intp)
+    pixel = nearest[:, None] + np.arange(-1, 3)
     weight = _keys(np.abs(place[:, None] - pixel))
     cell = np.broadcast_to(np.arange(cells)[:, None], pixel.shape).ravel()
     pixel, weight = pixel.ravel(), weight.ravel()

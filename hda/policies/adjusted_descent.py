@@ -40,13 +40,13 @@ class AdjustedDescent:
         self, observation: Observation, site: Array, memory: DescentMemory
     ) -> tuple[Command, DecisionStatus, DescentMemory]:
         """Shift the plan in flight, replan, or fly on."""
-        left, view = memory.reference, memory.view
-        if left is None or memory.site is None or np.array_equal(site, memory.site):
+        remaining, view = memory.reference, memory.view
+        if remaining is None or memory.site is None or np.array_equal(site, memory.site):
             return self.planned.command(observation, site, memory)
-        shifted = shift_landing_point(left, site, view.gravity)
+        shifted = shift_landing_point(remaining, site, view.gravity)
         possible = within_thrust(shifted, view.lander, observation.state.mass, self.reserve)
         possible = possible and within_pointing(shifted, view.lander, self.reserve)
-        if not possible or left.duration > self.adjust_time:
+        if not possible or remaining.duration > self.adjust_time:
             fresh = self.planned.command(observation, site, memory)
             if not possible or _is_cheaper(fresh[:2], shifted):
                 return fresh

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,9 +68,11 @@ class SafetyBelief:
         target = observation.target
         _fuse_into(
             observation.safety_map,
-            (float(target[0]) - self.corner[0], float(target[1]) - self.corner[1], observation.width),
+            _LookSquare(
+                float(target[0]) - self.corner[0], float(target[1]) - self.corner[1], observation.width
+            ),
             observation.state.position - np.array([self.corner[0], self.corner[1], target[2]]),
-            (lidar.noise / lidar.noise_range, math.tan(lidar.off_nadir_limit)),
+            _SensorNumbers(lidar.noise / lidar.noise_range, math.tan(lidar.off_nadir_limit)),
             LEVELS,
             log_likelihood,
             looks,
@@ -105,23 +108,37 @@ def log_reading(value: float, level: float, deviation: float) -> float:
     return -0.5 * score * score - math.log(deviation * math.sqrt(2.0 * math.pi))
 
 
+class _LookSquare(NamedTuple):
+    """[m] centre of a look, from the corner of the belief's square, and its width."""
+
+    east: float
+    north: float
+    width: float
+
+
+class _SensorNumbers(NamedTuple):
+    """Deviation of a reading over its range [1/m], and the tangent of the off-nadir limit."""
+
+    noise_per_metre: float
+    off_nadir_slope: float
+
+
 @compile_kernel
 def _fuse_into(
     safety_map: NDArray[np.float32],
-    look: tuple[float, float, float],
+    look: _LookSquare,
     position: Array,
-    sensor: tuple[float, float],
+    sensor: _SensorNumbers,
     levels: Array,
     log_likelihood: NDArray[np.float32],
     looks: NDArray[np.uint16],
 ) -> None:
-    """Add one look; `look` is (target x, target y, width), lengths from the square's corner."""
+    """Add one look; lengths from the corner of the belief's square."""
     target_x, target_y, width = look
-    noise_per_metre, limit = sensor
     side = looks.shape[0]
     n = safety_map.shape[0]
     height = position[2]
-    reach_squared = (limit * height) ** 2 * (1.0 - 1e-9)
+    seen_squared = (sensor.off_nadir_slope * height) ** 2 * (1.0 - 1e-9)
     for i in range(n):
         y = target_y + ((i + 0.5) / n - 0.5) * width
         row = math.floor(y)
@@ -129,9 +146,9 @@ def _fuse_into(
             x = target_x + ((j + 0.5) / n - 0.5) * width
             column = math.floor(x)
             across = (x - position[0]) ** 2 + (y - position[1]) ** 2
-            if across > reach_squared or not (0 <= row < side and 0 <= column < side):
+            if across > seen_squared or not (0 <= row < side and 0 <= column < side):
                 continue
-            deviation = max(noise_per_metre * math.sqrt(across + height * height), _LEAST_DEVIATION)
+            deviation = max(sensor.noise_per_metre * math.sqrt(across + height * height), _LEAST_DEVIATION)
             looks[row, column] += 1
             for k in range(levels.size):
                 log_likelihood[k, row, column] += log_reading(safety_map[i, j], levels[k], deviation)

@@ -167,7 +167,7 @@ class DeferredDecisionPolicy:
     ) -> Candidates:
         """The best site, then the best of those far enough from all before, and so on."""
         options, price = self.options, price.copy()
-        reach = max(math.ceil(options.separation) - 1, 0)
+        apart = max(math.ceil(options.separation) - 1, 0)
         present = belief.cell(observation.target)
         cells: list[tuple[int, int]] = []
         for _ in range(options.candidates):
@@ -181,7 +181,7 @@ class DeferredDecisionPolicy:
             ):
                 row, column = present
             cells.append((row, column))
-            price[max(row - reach, 0) : row + reach + 1, max(column - reach, 0) : column + reach + 1] = np.inf
+            price[max(row - apart, 0) : row + apart + 1, max(column - apart, 0) : column + apart + 1] = np.inf
         plane = float(observation.target[2])
         sites = np.array([belief.site(*cell, plane) for cell in cells])
         if cells[0] == present:

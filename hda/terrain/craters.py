@@ -147,24 +147,24 @@ def draw_craters(population: CraterPopulation, extent: float, rng: np.random.Gen
 
 @compile_kernel
 def _crater_elevation(
-    distance: float, radius: float, floor_radius: float, depth: float, rim_height: float, reach: float
+    distance: float, radius: float, floor_radius: float, depth: float, rim_height: float, ejecta_reach: float
 ) -> float:
     """Elevation above the plain at `distance` from the centre: flat floor, parabolic wall, ejecta as x^-3."""
     if distance <= radius:
         climb = max(distance - floor_radius, 0.0) / (radius - floor_radius)
         return rim_height - depth + depth * climb * climb
-    end = reach**-3.0
+    end = ejecta_reach**-3.0
     x = radius / distance
     return max(rim_height * (x * x * x - end) / (1.0 - end), 0.0)
 
 
 @compile_kernel
-def _add_craters(relief: NDArray[np.float32], table: Array, reach: float, pixel_size: float) -> None:
+def _add_craters(relief: NDArray[np.float32], table: Array, ejecta_reach: float, pixel_size: float) -> None:
     rows, columns = relief.shape
     for k in range(table.shape[0]):
         east, north, radius = table[k, 0] / pixel_size, table[k, 1] / pixel_size, table[k, 2] / pixel_size
         floor_radius, depth, rim_height = table[k, 3] / pixel_size, table[k, 4], table[k, 5]
-        outer = reach * radius
+        outer = ejecta_reach * radius
         for row in range(
             max(0, math.ceil(north - outer - 0.5)), min(rows, math.floor(north + outer - 0.5) + 1)
         ):
@@ -174,7 +174,7 @@ def _add_craters(relief: NDArray[np.float32], table: Array, reach: float, pixel_
             for column in range(first, min(columns, math.floor(east + half - 0.5) + 1)):
                 de = column + 0.5 - east
                 relief[row, column] += _crater_elevation(
-                    math.sqrt(dn * dn + de * de), radius, floor_radius, depth, rim_height, reach
+                    math.sqrt(dn * dn + de * de), radius, floor_radius, depth, rim_height, ejecta_reach
                 )
 
 
