@@ -31,6 +31,17 @@ class Ending(StrEnum):
     """Still in flight after the last decision."""
 
 
+ENDINGS: dict[str, str] = {
+    Ending.SUCCESS: "landed softly on safe ground",
+    Ending.HARD_LANDING: "reached safe ground, but too fast to be a success",
+    Ending.UNSAFE_SITE: "touched down on hazardous ground",
+    Ending.CRASH: "hit the ground faster than the crash speed",
+    Ending.TANK_EMPTY: "ran out of propellant above the ground",
+    Ending.TIMED_OUT: "was still in flight after its last decision",
+}
+"""Each ending in words that follow the name of who flew."""
+
+
 @dataclass(frozen=True)
 class Contact:
     """How the plane was met.
