@@ -11,6 +11,7 @@ import sys
 import numpy as np
 from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.console import tolerate_encoding
 from hda.ground.library import Ground, load_tile
 from hda.policies.belief import LEVEL_SHARES, LEVELS
@@ -26,7 +27,7 @@ _MARGIN = 36  # [m] around the widest look
 _BORDER = 10  # [m] of a tile's edge that Algorithm 1 cannot assess
 
 
-def level_shares(probability: NDArray[np.float32]) -> NDArray[np.float64]:
+def level_shares(probability: NDArray[np.float32]) -> Array:
     """Share of cells nearest to each level of V_P, shape (levels,)."""
     edges = 0.5 * (LEVELS[1:] + LEVELS[:-1])
     edges[[0, -1]] = 1e-3, 0.999
@@ -34,9 +35,7 @@ def level_shares(probability: NDArray[np.float32]) -> NDArray[np.float64]:
     return counts / probability.size
 
 
-def count_surroundings(
-    safe: NDArray[np.bool_], width: float, center: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def count_surroundings(safe: NDArray[np.bool_], width: float, center: Array) -> tuple[Array, Array]:
     """Cells and safe cells in each pair of distance classes around one noiseless look, shape (k, k) each."""
     half = round(max(LOOK_WIDTHS) / 2.0) + _MARGIN
     corner = np.floor(center).astype(int) - half
@@ -54,7 +53,7 @@ def count_surroundings(
     return cells, good
 
 
-def measure() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def measure() -> tuple[Array, Array]:
     """Level shares and the safe-share table, over the training tiles of each ground that presets use.
 
     Pairs of classes that never occur take the value of pairs with the same quotient of distances: one half.

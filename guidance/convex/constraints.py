@@ -13,10 +13,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from guidance.arrays import Array, Index
 from guidance.convex.layout import Layout
 from guidance.convex.scaling import ScaledProblem
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,14 +38,14 @@ class Rows:
     name: str
     cone: str
     cone_size: int
-    row: NDArray[np.int64]
-    column: NDArray[np.int64]
+    row: Index
+    column: Index
     value: Array
     bound: Array
     value_power: Array = field(default_factory=lambda: np.zeros(1))
     bound_rate: Array = field(default_factory=lambda: np.zeros(1))
 
-    def left_over(self, decision: Array) -> Array:
+    def slack_of(self, decision: Array) -> Array:
         """Slack b - A x, shape (cones, cone_size) (one cone for 'zero' and 'nonnegative')."""
         out = self.bound.copy()
         np.subtract.at(out, self.row, self.value * decision[self.column])
@@ -54,7 +53,7 @@ class Rows:
 
     def violation(self, decision: Array) -> float:
         """How far b - A x lies outside the cones; inside an inequality: minus the margin."""
-        rest = self.left_over(decision)
+        rest = self.slack_of(decision)
         if self.cone == "zero":
             return float(np.abs(rest).max())
         if self.cone == "nonnegative":
@@ -62,7 +61,7 @@ class Rows:
         return float((np.linalg.norm(rest[:, 1:], axis=1) - rest[:, 0]).max())
 
 
-def _stack(*blocks: tuple[NDArray[np.int64], NDArray[np.int64], float | Array]) -> dict[str, NDArray]:
+def _stack(*blocks: tuple[Index, Index, float | Array]) -> dict[str, NDArray]:
     """Concatenate (row, column, value) blocks of any one shape each."""
     return {
         "row": np.concatenate([row.ravel() for row, _, _ in blocks]),
@@ -109,8 +108,8 @@ def motion(layout: Layout, scaled: ScaledProblem) -> Rows:
     """Exact motion between nodes under a thrust acceleration linear in time, and the burnt log-mass."""
     intervals = layout.nodes - 1
     h = 1.0 / intervals
-    pull = np.concatenate([scaled.gravity * (h * h / 2.0), scaled.gravity * h, [0.0]])
-    return Rows("motion", "zero", 7, bound=np.tile(pull, intervals), **_motion_entries(layout))
+    fall = np.concatenate([scaled.gravity * (h * h / 2.0), scaled.gravity * h, [0.0]])
+    return Rows("motion", "zero", 7, bound=np.tile(fall, intervals), **_motion_entries(layout))
 
 
 def landing(layout: Layout, scaled: ScaledProblem) -> Rows:

@@ -10,14 +10,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.constants import MOON_GRAVITY
 from guidance.descent.problem import LandingProblem
 from guidance.descent.trajectory import Trajectory
 from guidance.kernel import compile_kernel
-
-Array = NDArray[np.float64]
 
 _BETWEEN = 4  # Runge-Kutta steps per interval, in which the thrust is smooth; each is a sample of the path
 
@@ -169,11 +167,11 @@ def _fly(
             total[:] = 0.0
             planned = 0.0
             for stage in range(4):
-                share = (part + 0.5 * ((stage + 1) // 2)) / _BETWEEN
+                fraction = (part + 0.5 * ((stage + 1) // 2)) / _BETWEEN
                 if stage != 2:
-                    planned = mass[k] * math.exp(share * (slope + bend * (1.0 - share)))
+                    planned = mass[k] * math.exp(fraction * (slope + bend * (1.0 - fraction)))
                 for axis in range(3):
-                    u = acceleration[k, axis] + share * (acceleration[k + 1, axis] - acceleration[k, axis])
+                    u = acceleration[k, axis] + fraction * (acceleration[k + 1, axis] - acceleration[k, axis])
                     rate[axis] = here[3 + axis]
                     rate[3 + axis] = u * planned
                 rate[6] = -_length(rate[3], rate[4], rate[5]) / exhaust_velocity

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
+from hda.flight.palette import line_style
 from studies.campaign.points import Rows
-from studies.compare.charts import line_style
 from studies.statistics.ratios import wilson_interval
 
 _PANELS = (("safe_site", "safe site [%]"), ("success", "success [%]"))

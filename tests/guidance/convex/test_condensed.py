@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from guidance import PAPER_LANDER, State
 from guidance.convex import constraints
 from guidance.convex.clarabel_solver import SolveStatus
-from guidance.convex.condensed import CondensedLayout, burnt_mass, expand, keeps_altitude, landing_moments
+from guidance.convex.condensed import burnt_mass, expand, keeps_altitude, landing_moments
 from guidance.convex.constraint_set import ConstraintSet
-from guidance.convex.layout import Layout
+from guidance.convex.layout import CondensedLayout, Layout
 from guidance.convex.programme import convex_template
 from guidance.convex.scaling import scale_problem
 from guidance.descent.problem import LandingProblem
@@ -40,7 +40,7 @@ def test_any_thrust_expands_to_exact_motion_and_lands_as_the_moments_say(seed, n
     assert constraints.motion(whole, scaled).violation(full) < 1e-12
     assert constraints.start(whole, scaled).violation(full) < 1e-12
     assert burnt_mass(layout, scaled).violation(thrust) < 1e-12
-    miss = landing_moments(layout, scaled).left_over(thrust).ravel()
+    miss = landing_moments(layout, scaled).slack_of(thrust).ravel()
     np.testing.assert_allclose(-miss[:3], full[whole.position[-1]], atol=1e-12)
     np.testing.assert_allclose(-miss[3:], full[whole.velocity[-1]], atol=1e-12)
 
