@@ -11,6 +11,7 @@ from hda.flight.episode import fly
 from hda.flight.record import EpisodeRecord
 from hda.task.scenario import sample_scenario
 from studies.campaign.monte_carlo import Study
+from studies.campaign.score import label_measure
 from studies.compare.histograms import MeasureHistograms
 from studies.compare.scores import StudyScores
 
@@ -21,12 +22,13 @@ COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#00
 """Okabe and Ito's palette, told apart by colour-blind readers."""
 
 _PANELS = (
-    ("reward", "reward"),
-    ("miss_distance_m", "landing error [m]"),
-    ("touchdown_speed_mps", "final speed [m/s]"),
-    ("maximum_thrust_n", "maximum thrust [N]"),
-    ("minimum_slant_angle_deg", "minimum slant angle [deg]"),
+    "reward",
+    "miss_distance_m",
+    "touchdown_speed_mps",
+    "maximum_thrust_n",
+    "minimum_slant_angle_deg",
 )
+"""Measures whose distributions the paper shows."""
 
 
 def draw_figures(out: Path, study: Study, scores: StudyScores) -> None:
@@ -55,11 +57,11 @@ def draw_histograms(path: Path, study: Study, histograms: MeasureHistograms) -> 
 
     figure = Figure(figsize=(14, 7), layout="constrained")
     axes = figure.subplots(2, 3).ravel()
-    for axis, (name, label) in zip(axes, _PANELS, strict=False):
+    for axis, name in zip(axes, _PANELS, strict=False):
         for k, policy in enumerate(study.policies):
             counts, color = histograms.count(name, policy), COLORS[k % len(COLORS)]
             axis.stairs(counts, histograms.edges[name], label=policy, color=color, linewidth=1.6)
-        axis.set_xlabel(label)
+        axis.set_xlabel(label_measure(name))
         axis.set_ylabel("episodes")
         axis.grid(alpha=0.25)
     handles, labels = axes[0].get_legend_handles_labels()

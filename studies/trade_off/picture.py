@@ -104,6 +104,6 @@ def _draw_weights(axis: Axes, rows: Sequence[TradeOffRow], start: TradeOffRow | 
 
 
 def _label(axis: Axes) -> None:
-    axis.set_xlabel("propellant burnt [%], mean with bootstrap interval")
+    axis.set_xlabel("propellant burnt [%], mean with Student's interval")
     axis.set_ylabel("safe site [%], Wilson's interval, thin: by tile")
     axis.grid(alpha=0.25)

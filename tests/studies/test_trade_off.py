@@ -15,7 +15,8 @@ from hda.policies.hazard_aware import HazardAwareSite
 from hda.policies.site_price import HazardAwareWeights
 from hda.registry import make_policy
 from hda.task.scenario import sample_scenario
-from studies.campaign.point_score import PointScore
+from studies.campaign.rows import MEASURES
+from studies.campaign.score import Score
 from studies.statistics.ratios import Interval
 from studies.trade_off.command import TradeOff, find_front, plan_points, run_trade_off
 from studies.trade_off.table import TradeOffRow
@@ -31,7 +32,18 @@ def forgetful_registry(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def row(name: str, safe: float, burnt: float, privileged: bool = False) -> TradeOffRow:
     ratio = Interval(safe, safe, safe)
-    score = PointScore(100, ratio, ratio, ratio, ratio, Interval(burnt, burnt, burnt))
+    means: dict[str, Interval] = {name: Interval(burnt, burnt, burnt) for name in MEASURES}
+    score = Score(
+        episodes=100,
+        safe_site=ratio,
+        safe_site_by_tile=ratio,
+        success=ratio,
+        success_by_tile=ratio,
+        success_at_least=safe,
+        means=means,
+        means_by_tile=means,
+        fallbacks=0,
+    )
     return TradeOffRow("paper", "validation", name, "", float("nan"), privileged, score)
 
 
