@@ -17,6 +17,7 @@ from studies.compare.scores import StudyScores
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#F0E442")
 """Okabe and Ito's palette, told apart by colour-blind readers."""
@@ -36,7 +37,7 @@ def draw_figures(out: Path, study: Study, scores: StudyScores) -> None:
     figures, trajectories = out / "figures", out / "trajectories"
     figures.mkdir(exist_ok=True)
     trajectories.mkdir(exist_ok=True)
-    draw_histograms(figures / "histograms.png", study, scores.histograms)
+    draw_histograms(study, scores.histograms).savefig(figures / "histograms.png", dpi=110)
     scenario = sample_scenario(study.preset, study.study_seed, scores.hardest, study.split)
     for name in study.policies:
         record = fly(study.make_policy(name), scenario)
@@ -51,7 +52,7 @@ def save_flight(path: Path, record: EpisodeRecord) -> None:
     np.savez_compressed(path, time=record.time, path=record.path, thrust=record.thrust, sites=sites)
 
 
-def draw_histograms(path: Path, study: Study, histograms: MeasureHistograms) -> None:
+def draw_histograms(study: Study, histograms: MeasureHistograms) -> Figure:
     """Draw the distributions that the paper shows, as step histograms of equal bins."""
     from matplotlib.figure import Figure
 
@@ -68,7 +69,7 @@ def draw_histograms(path: Path, study: Study, histograms: MeasureHistograms) -> 
     axes[-1].axis("off")
     axes[-1].legend(handles, labels, loc="center", frameon=False)
     figure.suptitle(f"preset {study.preset.name}, {study.episodes} episodes; end bins hold what lies beyond")
-    figure.savefig(path, dpi=110)
+    return figure
 
 
 def draw_flight(path: Path, record: EpisodeRecord) -> None:

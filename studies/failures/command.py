@@ -148,7 +148,8 @@ def show_failures(options: Failures) -> dict[str, list[Failure]]:
         if options.figures:
             from studies.failures.picture import draw_failure
 
-            draw_failure(out / picture_name(name, episode), record, describe_failure(failure))
+            figure = draw_failure(record, describe_failure(failure))
+            figure.savefig(out / picture_name(name, episode), dpi=75)
     write_csv(out / "failures.csv", explained)
     flown = {name: len(failed[name]) for name in chosen}
     write_markdown(out / "failures.md", study, explained, flown, options.figures)

@@ -196,7 +196,7 @@ def study_memory(options: MemoryStudy) -> tuple[GroupRow, ...]:
     write_csv(out / "memory.csv", rows)
     text = markdown(rows, sentences)
     (out / "memory.md").write_text(text)
-    draw_memory(out / "memory.png", rows, scores)
+    draw_memory(rows, scores).savefig(out / "memory.png", dpi=110)
     console.print(text, markup=False, highlight=False, soft_wrap=True)
     console.print(f"results in {out}")
     return rows

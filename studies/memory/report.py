@@ -6,11 +6,15 @@ import csv
 import math
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from studies.compare.figures import COLORS
 from studies.memory.answer import MEASURES, GroupRow
 from studies.memory.scores import AgentScore
 from studies.statistics.ratios import Interval
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _INTERVALS = ("interquartile_mean", "improvement", "difference")
 
@@ -62,7 +66,7 @@ def markdown(rows: Sequence[GroupRow], sentences: Sequence[str]) -> str:
     return "\n".join([*lines, "", *(f"- {sentence}" for sentence in sentences)]) + "\n"
 
 
-def draw_memory(path: Path, rows: Sequence[GroupRow], scores: Sequence[AgentScore]) -> None:
+def draw_memory(rows: Sequence[GroupRow], scores: Sequence[AgentScore]) -> Figure:
     """Draw each preset's agents: every seed, the interquartile mean and its interval."""
     from matplotlib.figure import Figure
 
@@ -88,4 +92,4 @@ def draw_memory(path: Path, rows: Sequence[GroupRow], scores: Sequence[AgentScor
         axis.grid(axis="y", alpha=0.25)
     grid[0, 0].set_ylabel("safe site [%]")
     figure.suptitle("every seed, and the interquartile mean with its 95 % interval")
-    figure.savefig(path, dpi=110)
+    return figure

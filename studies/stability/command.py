@@ -127,7 +127,7 @@ def study_stability(options: Stability) -> tuple[list[MarginRow], list[GainRow]]
     if options.figures:
         from studies.stability.picture import draw_stability
 
-        draw_stability(out / "stability.png", preset, options.required)
+        draw_stability(preset, options.required).savefig(out / "stability.png", dpi=110)
     print_gains(gain_rows, preset)
     console = Console()
     for sentence in words:

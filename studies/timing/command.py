@@ -120,7 +120,7 @@ def study_timing(options: Timing) -> list[Summary]:
     if options.figures:
         from studies.timing.picture import draw_timing
 
-        draw_timing(out / "timing.png", methods, calls)
+        draw_timing(methods, calls).savefig(out / "timing.png", dpi=110)
     feasible = sum(case.feasible for case in cases)
     print_summaries(summaries, f"{feasible} feasible and {len(cases) - feasible} infeasible cases")
     for sentence in words:
