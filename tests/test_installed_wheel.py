@@ -41,7 +41,7 @@ RUNS: dict[str, tuple[list[str], list[str]]] = {
         [*SMALL, "--sweep-episodes", "2", "--out", "calibrated"],
         ["calibrated/paper.csv"],
     ),
-    "studies.closed_loop": ([*SMALL, "--out", "laws.csv"], ["laws.csv"]),
+    "studies.closed_loop": ([*SMALL, "--out", "laws"], ["laws/table.csv"]),
     "studies.compare": (
         [*SMALL, "--policies", "single-divert", "hazard-aware", "td3", "td3-lstm", "--out", "compared"],
         ["compared/table.csv", "compared/report.html", "compared/figures/histograms.png"],
@@ -53,13 +53,13 @@ RUNS: dict[str, tuple[list[str], list[str]]] = {
         ["swept/thrust-error.png"],
     ),
     "studies.sample_size": ([], []),
-    "studies.scale": (SMALL, []),
+    "studies.scale": ([*SMALL, "--out", "scaled"], ["scaled/table.csv"]),
     "studies.stability": (["--gain-points", "2", "--out", "stable"], ["stable/stability.png"]),
     "studies.terrain_timing": (["--repeats", "1", "--size", "200"], []),
     "studies.timing": (["--starts", "1", "--out", "timed"], ["timed/timing.csv", "timed/timing.png"]),
     "studies.trade_off": (
         [*SMALL, "--presets", "paper", "--weights", "none", "--policies", "no-divert", "--out", "traded"],
-        ["traded/paper.csv"],
+        ["traded/table.csv", "traded/trade-off.png"],
     ),
 }
 """Command -> arguments of one small run, and what it must leave behind."""

@@ -177,7 +177,7 @@ def test_a_trade_off_shows_points_front_and_floor() -> None:
     (axes,) = draw_trade_off(rows, [Bounds("paper", 100, Interval(1.0, 0.9, 1.0), floor)]).axes
     assert axes.get_title() == "paper: policies"
     named: dict[str, Any] = {
-        c.get_label(): c for c in axes.containers if not str(c.get_label()).startswith("_")
+        str(c.get_label()): c for c in axes.containers if not str(c.get_label()).startswith("_")
     }
     assert list(named) == ["cheap", "safe", "dear", "seer *"]
     for label, (x, y) in zip(named, ((55.0, 80.0), (66.0, 95.0), (70.0, 70.0), (54.0, 99.0)), strict=True):
