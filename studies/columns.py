@@ -8,8 +8,9 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields
 from enum import Flag, auto
 from itertools import chain
+from operator import attrgetter
 from pathlib import Path
-from typing import TYPE_CHECKING, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from studies.statistics.ratios import Interval
 
@@ -43,6 +44,7 @@ class Column(Generic[Row]):
         unit: shown behind the headings.
         label: name in full, without the unit; the heading by default.
         interval: `value` gives an Interval: the file has its ends too.
+        between: stands between the ends of an interval where it is shown.
         by_tile: gives the interval clustered by tile, for those that have one.
         stem: name that the ends begin with in the file; `key` by default.
         late: joined the file after others: it stands at its end, so that files keep their order.
@@ -60,6 +62,7 @@ class Column(Generic[Row]):
     unit: str = ""
     label: str = ""
     interval: bool = False
+    between: str = "-"
     by_tile: Callable[[Row], Interval] | None = None
     stem: str = ""
     late: bool = False
@@ -132,12 +135,21 @@ class Column(Generic[Row]):
             return value + mark
         return self.show(value.estimate if isinstance(value, Interval) else value) + mark
 
-    def ranges(self, row: Row, between: str = "-") -> list[str]:
-        """The interval, and the one clustered by tile, as tables show them: as many as there are."""
+    def ranges(self, row: Row) -> list[str]:
+        """The interval, and the one clustered by tile, as tables show them: as many as there are.
+
+        An end that is unknown or infinite says nothing, so such an interval is not shown.
+        """
         value = self.value(row)
-        found = [value] if isinstance(value, Interval) and not math.isnan(value.low) else []
+        found = [value] if isinstance(value, Interval) else []
         found += [] if self.by_tile is None else [self.by_tile(row)]
-        return [f"{self.show(one.low)}{between}{self.show(one.high)}" for one in found]
+        told = [one for one in found if math.isfinite(one.low) and math.isfinite(one.high)]
+        return [f"{self.show(one.low)}{self.between}{self.show(one.high)}" for one in told]
+
+
+def field_columns(kind: type[Any]) -> list[Column[Any]]:
+    """A column for every field of a dataclass, under its own name."""
+    return [Column(field.name, field.name, attrgetter(field.name)) for field in fields(kind)]
 
 
 def file_number(value: float) -> str:

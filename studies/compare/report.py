@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -158,7 +158,7 @@ def table_lines(columns: Sequence[Column[Row]], rows: Sequence[Row]) -> list[lis
 
 
 def _table_cell(column: Column[Row], row: Row) -> Cell:
-    plain_tiled = zip(("{}", "[{}]"), column.ranges(row, " to "), strict=False)
+    plain_tiled = zip(("{}", "[{}]"), replace(column, between=" to ").ranges(row), strict=False)
     ranges = tuple(form.format(ends) for form, ends in plain_tiled)
     return Cell(column.key, column.cells(row)[0], column.text(row), ranges)
 

@@ -7,6 +7,7 @@ NASA/TP-2010-216447).
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from dataclasses import dataclass
 from typing import Literal
 
@@ -114,13 +115,10 @@ def needed_episodes(share: float, confidence: float = 0.9, failures: int = 0) ->
     failure = 1.0 - _share(share)
     risk = 1.0 - finite_number("confidence", confidence, above=0.0, at_most=0.9999)
     allowed = int(finite_number("failures", failures, at_least=0))
-    low, high = allowed, allowed + 1  # at `low` episodes everything may fail
+    high = allowed + 1  # at one less everything may fail
     while binom.cdf(allowed, high, failure) > risk:
-        low, high = high, 2 * high
-    while high - low > 1:
-        middle = (low + high) // 2
-        low, high = (middle, high) if binom.cdf(allowed, middle, failure) > risk else (low, middle)
-    return high
+        high *= 2
+    return bisect_left(range(high), True, key=lambda count: binom.cdf(allowed, count, failure) <= risk)
 
 
 def order_bound(values: ArrayLike, share: float = 0.9973, confidence: float = 0.9) -> OrderBound:

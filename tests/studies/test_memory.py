@@ -218,6 +218,9 @@ def test_runs_are_flown_compared_and_drawn(root, tmp_path, capsys):
         - np.mean([s.safe_site_percent for s in scores[:2]]),
         abs=1e-4,
     )
+    told = json.loads((tmp_path / "provenance.json").read_text())
+    assert len(told["sources"]) == 4
+    assert told["options"]["validation_episodes"] == 3
     assert "| paper | td3-lstm | safe site | 2 |" in (tmp_path / "memory.md").read_text()
     assert (tmp_path / "memory.png").stat().st_size > 5000
     assert re.search(r"On paper, .*td3-lstm.* points of safe", capsys.readouterr().out)
