@@ -13,8 +13,9 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from guidance.arrays import Array
 from guidance.constants import MOON_GRAVITY
 from guidance.kernel import compile_kernel
 from guidance.lander import Lander
@@ -47,12 +48,12 @@ def position_factor(burnt: float) -> float:
 
 @compile_kernel
 def propagate_into(
-    start: NDArray[np.float64],
-    thrust: NDArray[np.float64],
+    start: Array,
+    thrust: Array,
     duration: float,
-    gravity: NDArray[np.float64],
+    gravity: Array,
     exhaust_velocity: float,
-    out: NDArray[np.float64],
+    out: Array,
 ) -> None:
     """Write the 7-vector reached from `start` (x y z vx vy vz m) under a constant thrust into `out`."""
     mass = start[6]
@@ -105,11 +106,11 @@ def propagate(
 
 def integrate(
     state: State,
-    thrust_at: Callable[[float], NDArray[np.float64]],
-    times: NDArray[np.float64],
+    thrust_at: Callable[[float], Array],
+    times: Array,
     lander: Lander,
     gravity: ArrayLike = MOON_GRAVITY,
-) -> NDArray[np.float64]:
+) -> Array:
     """Fly a thrust that varies in time (scipy's DOP853, restarted at each of `times`, where thrust may kink).
 
     Args:
@@ -132,7 +133,7 @@ def integrate(
         raise ValueError("times must be finite and strictly increasing, at least two")
     pull = finite_vector("gravity", gravity, 3)
 
-    def rate(time: float, y: NDArray[np.float64]) -> NDArray[np.float64]:
+    def rate(time: float, y: Array) -> Array:
         force = thrust_at(time)
         flow = float(np.linalg.norm(force)) / lander.exhaust_velocity
         return np.concatenate([y[3:6], force / y[6] + pull, [-flow]])

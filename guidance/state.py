@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.validation import finite_number, finite_vector
 
 
@@ -24,8 +24,8 @@ class State:
         ValueError: a field is not finite, has the wrong shape, or the mass is not positive.
     """
 
-    position: NDArray[np.float64]
-    velocity: NDArray[np.float64]
+    position: Array
+    velocity: Array
     mass: float
 
     def __post_init__(self) -> None:
@@ -37,13 +37,13 @@ class State:
         object.__setattr__(self, "mass", finite_number("mass", self.mass, above=0.0))
 
     @classmethod
-    def parse(cls, value: State | Sequence[float] | NDArray[np.float64]) -> State:
+    def parse(cls, value: State | Sequence[float] | Array) -> State:
         """Accept a State or seven numbers (x, y, z, vx, vy, vz, mass); raise ValueError for anything else."""
         if isinstance(value, State):
             return value
         numbers = finite_vector("state", value, 7)
         return cls(numbers[:3], numbers[3:6], float(numbers[6]))
 
-    def as_array(self) -> NDArray[np.float64]:
+    def as_array(self) -> Array:
         """Seven numbers (x, y, z, vx, vy, vz, mass), a new array."""
         return np.concatenate([self.position, self.velocity, [self.mass]])

@@ -10,9 +10,7 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
+from guidance.arrays import Array
 from guidance.kernel import compile_kernel
 from guidance.lander import Lander
 
@@ -20,7 +18,7 @@ _ROUNDING = 1e-12  # [rad] beyond the limit that a command on it may stand by ro
 
 
 @compile_kernel
-def saturate_into(thrust: NDArray[np.float64], min_thrust: float, max_thrust: float) -> None:
+def saturate_into(thrust: Array, min_thrust: float, max_thrust: float) -> None:
     """Bring |thrust| into [min_thrust, max_thrust] in place, direction kept; a zero vector points up."""
     largest = max(abs(thrust[0]), abs(thrust[1]), abs(thrust[2]))
     if largest == 0.0:
@@ -38,9 +36,7 @@ def saturate_into(thrust: NDArray[np.float64], min_thrust: float, max_thrust: fl
 
 
 @compile_kernel
-def limit_into(
-    thrust: NDArray[np.float64], min_thrust: float, max_thrust: float, pointing_limit: float
-) -> bool:
+def limit_into(thrust: Array, min_thrust: float, max_thrust: float, pointing_limit: float) -> bool:
     """Replace a thrust by the nearest admissible one; say whether the pointing limit acted.
 
     A zero vector points up. A command straight down has a ring of nearest thrusts; the eastern one is taken.

@@ -13,8 +13,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from guidance.arrays import Array
+from guidance.golden_section import divide, keep_lower, keep_upper
 from guidance.kernel import compile_kernel
 from guidance.lander import Lander
 from guidance.state import State
@@ -22,11 +24,10 @@ from guidance.validation import finite_vector
 
 _SHORTEST, _LONGEST = 0.2, 1.5  # times of flight searched, in free falls to the plane
 _SECTIONS = 22  # of the golden section: 1e-4 of the interval
-_GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 
 
 @compile_kernel
-def _cost(east: float, north: float, up: float, motion: NDArray[np.float64], time: float) -> float:
+def _cost(east: float, north: float, up: float, motion: Array, time: float) -> float:
     """[m/s] at one time of flight; `motion` is (velocity (3), pull, greatest acceleration)."""
     vx, vy, vz, pull, push = motion
     first_x, first_y = east / time, north / time
@@ -37,32 +38,30 @@ def _cost(east: float, north: float, up: float, motion: NDArray[np.float64], tim
 
 
 @compile_kernel
-def least_cost(east: float, north: float, up: float, motion: NDArray[np.float64]) -> tuple[float, float]:
+def least_cost(east: float, north: float, up: float, motion: Array) -> tuple[float, float]:
     """(velocity change [m/s], time of flight [s]) of the cheapest two-impulse landing at an offset [m]."""
     sink, pull = motion[2], motion[3]
     fall = (sink + math.sqrt(max(sink * sink - 2.0 * pull * up, 0.0))) / pull
-    low, high = _SHORTEST * fall, _LONGEST * fall
-    left, right = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
-    at_left, at_right = _cost(east, north, up, motion, left), _cost(east, north, up, motion, right)
+    bracket = divide(_SHORTEST * fall, _LONGEST * fall)
+    at_first = _cost(east, north, up, motion, bracket.first)
+    at_second = _cost(east, north, up, motion, bracket.second)
     for _ in range(_SECTIONS):
-        if at_left < at_right:
-            high, right, at_right = right, left, at_left
-            left = high - _GOLDEN * (high - low)
-            at_left = _cost(east, north, up, motion, left)
+        if at_first < at_second:
+            bracket, at_second = keep_lower(bracket), at_first
+            at_first = _cost(east, north, up, motion, bracket.first)
         else:
-            low, left, at_left = left, right, at_right
-            right = low + _GOLDEN * (high - low)
-            at_right = _cost(east, north, up, motion, right)
-    return (at_left, left) if at_left < at_right else (at_right, right)
+            bracket, at_first = keep_upper(bracket), at_second
+            at_second = _cost(east, north, up, motion, bracket.second)
+    return (at_first, bracket.first) if at_first < at_second else (at_second, bracket.second)
 
 
 @compile_kernel
 def _fill(
-    east: NDArray[np.float64],
-    north: NDArray[np.float64],
+    east: Array,
+    north: Array,
     up: float,
-    motion: NDArray[np.float64],
-    out: NDArray[np.float64],
+    motion: Array,
+    out: Array,
 ) -> None:
     for row in range(north.size):
         for column in range(east.size):
@@ -71,12 +70,12 @@ def _fill(
 
 def divert_cost(
     state: State,
-    east: NDArray[np.float64],
-    north: NDArray[np.float64],
+    east: Array,
+    north: Array,
     plane: float,
     lander: Lander,
     gravity: ArrayLike,
-) -> NDArray[np.float64]:
+) -> Array:
     """Estimated propellant to land softly at each point of a lattice.
 
     Args:

@@ -12,16 +12,15 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from guidance.arrays import Array
 from guidance.constants import MOON_GRAVITY
 from guidance.lander import Lander
 from guidance.state import State
 from guidance.thrust_limits import pointing_angle
 from guidance.validation import finite_number, finite_vector
 from guidance.zem_zev import time_to_go
-
-Array = NDArray[np.float64]
 
 _LONGEST = 3.0  # times the quartic's
 _TIMES = 81

@@ -7,10 +7,12 @@ import math
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from guidance.arrays import Array
 
 
-def finite_vector(name: str, value: ArrayLike, size: int) -> NDArray[np.float64]:
+def finite_vector(name: str, value: ArrayLike, size: int) -> Array:
     """Return `value` as a float64 array of shape (size,); raise ValueError naming `name` otherwise."""
     try:
         vector = np.array(value, dtype=np.float64)

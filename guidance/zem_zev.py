@@ -17,8 +17,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from guidance.arrays import Array
 from guidance.constants import MOON_GRAVITY
 from guidance.kernel import compile_kernel
 from guidance.lander import Lander
@@ -79,10 +80,10 @@ def _first_rise(beta: float, delta: float, epsilon: float) -> float:
 
 @compile_kernel
 def solve_time_to_go(
-    position: NDArray[np.float64],
-    velocity: NDArray[np.float64],
-    target: NDArray[np.float64],
-    target_velocity: NDArray[np.float64],
+    position: Array,
+    velocity: Array,
+    target: Array,
+    target_velocity: Array,
     fourth_power: float,
 ) -> float:
     """Smallest positive root of the quartic; `fourth_power` is the factor of t^4, W + |g|^2/2, above zero."""
@@ -106,12 +107,12 @@ def solve_time_to_go(
 
 @compile_kernel
 def zem_zev_into(
-    state: NDArray[np.float64],
-    target: NDArray[np.float64],
+    state: Array,
+    target: Array,
     gains: tuple[float, float],
     time_to_go: float,
-    gravity: NDArray[np.float64],
-    out: NDArray[np.float64],
+    gravity: Array,
+    out: Array,
 ) -> None:
     """Write the commanded thrust acceleration [m/s^2] for a landing at rest into `out` (3,)."""
     for axis in range(3):
@@ -122,7 +123,7 @@ def zem_zev_into(
         out[axis] = gains[0] * miss / (time_to_go * time_to_go) - gains[1] * velocity_miss / time_to_go
 
 
-def quartic_fourth_power(gravity: NDArray[np.float64], time_weight: float | None) -> float:
+def quartic_fourth_power(gravity: Array, time_weight: float | None) -> float:
     """Factor of t^4 in the time-to-go quartic, [m^2/s^4]: W + |g|^2/2, with None for the paper's W = |g|^2/2.
 
     Raises:
@@ -176,7 +177,7 @@ def zem_zev_acceleration(
     gains: tuple[float, float] = (6.0, 2.0),
     gravity: ArrayLike = MOON_GRAVITY,
     target_velocity: ArrayLike = (0.0, 0.0, 0.0),
-) -> NDArray[np.float64]:
+) -> Array:
     """Commanded thrust acceleration of ZEM/ZEV guidance to `target` (the module's first equation).
 
     Args:
@@ -208,7 +209,7 @@ def zem_zev_acceleration(
     return out - velocity_gain / time * arrival  # the kernel knows no velocity at the target
 
 
-def saturate_thrust(thrust: ArrayLike, lander: Lander) -> NDArray[np.float64]:
+def saturate_thrust(thrust: ArrayLike, lander: Lander) -> Array:
     """What the vehicle gives for a commanded thrust: the nearest that keeps its bounds and pointing limit.
 
     Within the pointing limit the direction is kept. A zero command to an engine that cannot stop

@@ -13,6 +13,7 @@ import numpy as np
 import tyro
 from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.console import tolerate_encoding
 from guidance.validation import finite_number
 from hda.ground.library import Ground, load_tile
@@ -45,7 +46,7 @@ class BeliefStatistics:
         finite_number("tiles", self.tiles, at_least=1)
 
 
-def level_shares(probability: NDArray[np.float32]) -> NDArray[np.float64]:
+def level_shares(probability: NDArray[np.float32]) -> Array:
     """Share of cells nearest to each level of V_P, shape (levels,)."""
     edges = 0.5 * (LEVELS[1:] + LEVELS[:-1])
     edges[[0, -1]] = 1e-3, 0.999
@@ -53,9 +54,7 @@ def level_shares(probability: NDArray[np.float32]) -> NDArray[np.float64]:
     return counts / probability.size
 
 
-def count_surroundings(
-    safe: NDArray[np.bool_], width: float, center: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def count_surroundings(safe: NDArray[np.bool_], width: float, center: Array) -> tuple[Array, Array]:
     """Cells and safe cells in each pair of distance classes around one noiseless look, shape (k, k) each."""
     half = round(max(LOOK_WIDTHS) / 2.0) + _MARGIN
     corner = np.floor(center).astype(int) - half
@@ -73,7 +72,7 @@ def count_surroundings(
     return cells, good
 
 
-def measure(tiles: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def measure(tiles: int) -> tuple[Array, Array]:
     """Level shares and the safe-share table, over the first training tiles of each ground that presets use.
 
     Pairs of classes that never occur take the value of pairs with the same quotient of distances: one half.

@@ -18,7 +18,7 @@ from guidance import solve_pdg
 from guidance.console import tolerate_encoding
 from guidance.descent.residuals import fly_residuals
 from guidance.validation import finite_number
-from hda.flight.episode import advance, begin_flight, observe
+from hda.flight.episode import fly_legs
 from hda.policy import PrivilegedPolicy
 from hda.registry import make_policy
 from hda.task.scenario import sample_scenario
@@ -86,18 +86,9 @@ def measure_steps(options: Bench) -> dict[str, np.ndarray]:
     for episode in range(-warm_up, options.episodes):
         scenario = sample_scenario(options.preset, 0, episode % options.episodes, "tuning")
         memory = policy.begin(scenario.view, scenario.streams.policy())
-        flight, ended = begin_flight(scenario), False
-        while not ended:
-            start = perf_counter()
-            observation = observe(scenario, flight)
-            looked = perf_counter()
-            decision, memory = policy.decide(observation, memory)
-            decided = perf_counter()
-            step = advance(scenario, flight, decision)
-            flown = perf_counter()
-            flight, ended = step.flight, step.outcome is not None
-            if episode >= 0:
-                times.append((looked - start, decided - looked, flown - decided))
+        legs = list(fly_legs(scenario, policy.decide, memory))
+        if episode >= 0:
+            times += [(leg.look_time, leg.decision_time, leg.flight_time) for leg in legs]
     looks, decisions, flights = np.array(times).T
     return {
         "look": looks,

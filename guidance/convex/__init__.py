@@ -1,9 +1,10 @@
 """The cone programme: least propellant, or least landing error, at one time of flight.
 
 From the bottom: where each unknown stands (`layout`), units (`scaling`), one function per constraint
-(`constraints`, and without states `condensed`), which of them a problem needs (`constraint_set`), the
-assembled programmes, the one door to Clarabel, and the check of its proofs (`farkas`). It knows nothing of
-the search for a time, of planners, or of the references, which share no code with it.
+(`constraints`, and without states `condensed`), which of them a problem needs (`constraint_set`), the one
+door to Clarabel, the arrays it is given (`assembly`), the programmes, and the check of its proofs
+(`farkas`). It knows nothing of the search for a time, of planners, or of the references, which share no code
+with it.
 """
 
 from typing import TYPE_CHECKING

@@ -1,29 +1,25 @@
 """The conic programme of flights that share a trunk and then part, one branch to each candidate site.
 
-State, mass and thrust of the trunk's nodes are the same variables in every branch. As in
-`guidance.convex.programme`, one solver is built per sparsity from fixed nominal numbers, and every solve
-replaces all numbers.
+State, mass and thrust of the trunk's nodes are the same variables in every branch.
 """
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from guidance.arrays import Array, Index
 from guidance.convex import constraints
-from guidance.convex.clarabel_solver import ConicSolver, SolveStatus
+from guidance.convex.assembly import Assembly, nominal_numbers, once_per_thread
+from guidance.convex.clarabel_solver import DEFAULT_TOLERANCE, SolveStatus
 from guidance.convex.constraint_set import ConstraintSet
 from guidance.convex.constraints import Rows
 from guidance.convex.layout import Layout
-from guidance.convex.programme import ConvexSolution, cones_of, nominal_numbers
+from guidance.convex.programme import ConvexSolution
 from guidance.convex.scaling import ScaledProblem
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -46,7 +42,7 @@ class Branching:
         return Layout(self.constraint_set.nodes)
 
     @cached_property
-    def columns(self) -> NDArray[np.int64]:
+    def columns(self) -> Index:
         """Shape (branches, n): where each number of a branch's own layout stands in the decision vector."""
         size = self.layout.size
         shared = size // self.constraint_set.nodes * self.shared_nodes
@@ -108,26 +104,12 @@ class Branching:
 class BranchedProgramme:
     """The assembled programme of one Branching."""
 
-    def __init__(self, branching: Branching, tolerance: float = 1e-8) -> None:
-        """Fix sparsity and scaling from nominal numbers that no caller can change."""
-        from scipy.sparse import csc_matrix
-
+    def __init__(self, branching: Branching) -> None:
+        """Assemble it from nominal numbers."""
         self.branching = branching
-        rows = branching.rows([nominal_numbers(branching.constraint_set.nodes)] * branching.branches)
-        first = np.cumsum([0] + [part.bound.size for part in rows])
-        row = np.concatenate([part.row + offset for part, offset in zip(rows, first, strict=False)])
-        column = np.concatenate([part.column for part in rows])
-        self._order = np.lexsort((row, column))
-        pointer = np.concatenate([[0], np.cumsum(np.bincount(column, minlength=branching.size))])
-        values, bound = self._numbers(rows)
-        shape = (int(first[-1]), branching.size)
-        matrix = csc_matrix((values, row[self._order], pointer), shape=shape)
+        nominal = [nominal_numbers(branching.constraint_set.nodes)] * branching.branches
         weights = np.full(branching.branches, 1.0 / branching.branches)
-        self._solver = ConicSolver(matrix, bound, self._cost(weights), cones_of(rows), tolerance, True)
-
-    def _numbers(self, rows: list[Rows]) -> tuple[Array, Array]:
-        values = np.concatenate([part.value for part in rows])
-        return values[self._order], np.concatenate([part.bound for part in rows])
+        self._assembly = Assembly(branching.rows(nominal), self._cost(weights), DEFAULT_TOLERANCE)
 
     def _cost(self, weights: Array) -> Array:
         cost = np.zeros(self.branching.size)
@@ -137,7 +119,7 @@ class BranchedProgramme:
     def solve(self, scaled: Sequence[ScaledProblem], weights: Array) -> list[ConvexSolution] | None:
         """Least weighted propellant; each branch as a solution of its own, or None if there is none."""
         rows = self.branching.rows(scaled)
-        answer = self._solver.solve(*self._numbers(rows), self._cost(weights))
+        answer = self._assembly.solve(rows, self._cost(weights), refine=True)
         if answer.status is not SolveStatus.SOLVED:
             return None
         layout = self.branching.layout
@@ -154,18 +136,7 @@ class BranchedProgramme:
         ]
 
 
-class _ProgrammeCache(threading.local):
-    """Programmes of one thread: a solver object must not be shared while it solves."""
-
-    def __init__(self) -> None:
-        self.programmes: dict[Branching, BranchedProgramme] = {}
-
-
-_CACHE = _ProgrammeCache()
-
-
+@once_per_thread
 def branched_programme(branching: Branching) -> BranchedProgramme:
     """The assembled programme of a Branching: built once per thread, then kept."""
-    if branching not in _CACHE.programmes:
-        _CACHE.programmes[branching] = BranchedProgramme(branching)
-    return _CACHE.programmes[branching]
+    return BranchedProgramme(branching)

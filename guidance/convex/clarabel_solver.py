@@ -12,10 +12,15 @@ from enum import Enum
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from guidance.arrays import Array
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_matrix
+
+
+DEFAULT_TOLERANCE = 1e-8
+"""Gap and feasibility tolerance of a solve."""
 
 
 class SolveStatus(Enum):
@@ -52,8 +57,8 @@ class ConicAnswer:
     """
 
     status: SolveStatus
-    primal: NDArray[np.float64]
-    dual: NDArray[np.float64]
+    primal: Array
+    dual: Array
     iterations: int
     words: str
 
@@ -80,10 +85,10 @@ class ConicSolver:
     def __init__(
         self,
         matrix: csc_matrix,
-        bound: NDArray[np.float64],
-        cost: NDArray[np.float64],
+        bound: Array,
+        cost: Array,
         cones: tuple[tuple[str, int], ...],
-        tolerance: float = 1e-8,
+        tolerance: float = DEFAULT_TOLERANCE,
         refine: bool = False,
     ) -> None:
         """Assemble from nominal numbers, and solve them once.
@@ -127,14 +132,12 @@ class ConicSolver:
         self._solver = clarabel.DefaultSolver(quadratic, cost, matrix, bound, cone_list(cones), settings)
         self._solver.solve()
 
-    def _check(self, *arrays: NDArray[np.float64]) -> None:
+    def _check(self, *arrays: Array) -> None:
         for array, size in zip(arrays, self._shape, strict=True):
             if array.shape != (size,) or not np.isfinite(array).all():
                 raise ValueError("conic data must be finite and of the assembled shape")
 
-    def solve(
-        self, values: NDArray[np.float64], bound: NDArray[np.float64], cost: NDArray[np.float64]
-    ) -> ConicAnswer:
+    def solve(self, values: Array, bound: Array, cost: Array) -> ConicAnswer:
         """Solve with new numbers: the stored entries of A in CSC order, b and q.
 
         No exception of the solver's comes through, panics included.

@@ -7,51 +7,16 @@ the whole problem. A problem that is infeasible here is infeasible with the alti
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from guidance.arrays import Array, Index
 from guidance.convex.constraints import Rows
-from guidance.convex.layout import Layout
+from guidance.convex.layout import CONTROL_SIZE, STATE_SIZE, CondensedLayout, Layout
 from guidance.convex.scaling import ScaledProblem
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
-_PER_NODE = 5  # log-mass 1, thrust acceleration 3, its slack 1: in the order of Layout
 _BELOW = 1e-8  # scaled altitude below the target's that counts as rounding
-
-
-@dataclass(frozen=True)
-class CondensedLayout:
-    """Indices into the condensed decision vector of `nodes` nodes, node by node."""
-
-    nodes: int
-
-    @property
-    def size(self) -> int:
-        """Length of the decision vector."""
-        return _PER_NODE * self.nodes
-
-    @cached_property
-    def _table(self) -> Index:
-        return np.arange(self.size).reshape(self.nodes, _PER_NODE)
-
-    @cached_property
-    def log_mass(self) -> Index:
-        """Shape (N,)."""
-        return self._table[:, 0]
-
-    @cached_property
-    def acceleration(self) -> Index:
-        """Thrust acceleration, shape (N, 3)."""
-        return self._table[:, 1:4]
-
-    @cached_property
-    def slack(self) -> Index:
-        """Upper bound of the thrust acceleration's magnitude, shape (N,)."""
-        return self._table[:, 4]
 
 
 @lru_cache(maxsize=64)
@@ -98,14 +63,15 @@ def landing_moments(layout: CondensedLayout, scaled: ScaledProblem) -> Rows:
 def expand(layout: CondensedLayout, scaled: ScaledProblem, primal: Array) -> Array:
     """Decision vector of the whole problem (`Layout`): the states by recursion."""
     n, h = layout.nodes, 1.0 / (layout.nodes - 1)
-    out = np.empty((n, 11))
-    out[:, 6:] = primal.reshape(n, _PER_NODE)
-    u, g = out[:, 7:10], scaled.gravity
-    out[0, :3], out[0, 3:6] = scaled.position, scaled.velocity
-    out[1:, 3:6] = (0.5 * h) * (u[:-1] + u[1:]) + h * g
-    np.cumsum(out[:, 3:6], axis=0, out=out[:, 3:6])
-    out[1:, :3] = h * out[:-1, 3:6] + (h * h) * (u[:-1] / 3.0 + u[1:] / 6.0 + 0.5 * g)
-    np.cumsum(out[:, :3], axis=0, out=out[:, :3])
+    out = np.empty((n, STATE_SIZE + CONTROL_SIZE))
+    r, v, controls = out[:, :3], out[:, 3:STATE_SIZE], out[:, STATE_SIZE:]
+    controls[:] = primal.reshape(n, CONTROL_SIZE)
+    u, g = controls[:, 1:4], scaled.gravity
+    r[0], v[0] = scaled.position, scaled.velocity
+    v[1:] = (0.5 * h) * (u[:-1] + u[1:]) + h * g
+    np.cumsum(v, axis=0, out=v)
+    r[1:] = h * v[:-1] + (h * h) * (u[:-1] / 3.0 + u[1:] / 6.0 + 0.5 * g)
+    np.cumsum(r, axis=0, out=r)
     return out.ravel()
 
 

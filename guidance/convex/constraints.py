@@ -13,10 +13,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from guidance.arrays import Array, Index
 from guidance.convex.layout import Layout
 from guidance.convex.scaling import ScaledProblem
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,8 +38,8 @@ class Rows:
     name: str
     cone: str
     cone_size: int
-    row: NDArray[np.int64]
-    column: NDArray[np.int64]
+    row: Index
+    column: Index
     value: Array
     bound: Array
     value_power: Array = field(default_factory=lambda: np.zeros(1))
@@ -62,7 +61,7 @@ class Rows:
         return float((np.linalg.norm(rest[:, 1:], axis=1) - rest[:, 0]).max())
 
 
-def _stack(*blocks: tuple[NDArray[np.int64], NDArray[np.int64], float | Array]) -> dict[str, NDArray]:
+def _stack(*blocks: tuple[Index, Index, float | Array]) -> dict[str, NDArray]:
     """Concatenate (row, column, value) blocks of any one shape each."""
     return {
         "row": np.concatenate([row.ravel() for row, _, _ in blocks]),

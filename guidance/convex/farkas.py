@@ -10,11 +10,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.convex.constraints import Rows
 
-Array = NDArray[np.float64]
 _UNNAMED = ("start", "motion", "landing", "thrust", "landing error", "landing error limit")
 
 

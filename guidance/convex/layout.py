@@ -4,35 +4,69 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-_PER_NODE = 11  # position 3, velocity 3, log-mass 1, thrust acceleration 3, its slack 1
+from guidance.arrays import Index
 
-Index = NDArray[np.int64]
+STATE_SIZE = 6
+"""Position 3 and velocity 3 of a node, which stand before its log-mass."""
+CONTROL_SIZE = 5
+"""Log-mass 1, thrust acceleration 3 and its slack 1."""
 
 
 @dataclass(frozen=True)
-class Layout:
-    """Indices into the decision vector of `nodes` nodes, node by node.
+class CondensedLayout:
+    """Indices into the decision vector without states of `nodes` nodes, node by node.
 
     Attributes:
         nodes: N, at least 3; there are N - 1 intervals.
-        free_landing_point: whether the vector ends with one more number, the landing error, because the
-            landing point may move in the target plane.
     """
 
     nodes: int
-    free_landing_point: bool = False
+    states: ClassVar[int] = 0
 
     @property
     def size(self) -> int:
         """Length of the decision vector."""
-        return _PER_NODE * self.nodes + int(self.free_landing_point)
+        return (self.states + CONTROL_SIZE) * self.nodes
 
     def _block(self, first: int, width: int) -> Index:
-        return np.arange(self.nodes)[:, None] * _PER_NODE + np.arange(first, first + width)
+        return np.arange(self.nodes)[:, None] * (self.states + CONTROL_SIZE) + np.arange(first, first + width)
+
+    @cached_property
+    def log_mass(self) -> Index:
+        """Shape (N,)."""
+        return self._block(self.states, 1)[:, 0]
+
+    @cached_property
+    def acceleration(self) -> Index:
+        """Thrust acceleration, shape (N, 3)."""
+        return self._block(self.states + 1, 3)
+
+    @cached_property
+    def slack(self) -> Index:
+        """Upper bound of the thrust acceleration's magnitude, shape (N,)."""
+        return self._block(self.states + 4, 1)[:, 0]
+
+
+@dataclass(frozen=True)
+class Layout(CondensedLayout):
+    """Indices into the whole decision vector: each node's state stands before the rest.
+
+    Attributes:
+        free_landing_point: whether the vector ends with one more number, the landing error, because the
+            landing point may move in the target plane.
+    """
+
+    free_landing_point: bool = False
+    states: ClassVar[int] = STATE_SIZE
+
+    @property
+    def size(self) -> int:
+        """Length of the decision vector."""
+        return super().size + int(self.free_landing_point)
 
     @cached_property
     def position(self) -> Index:
@@ -43,21 +77,6 @@ class Layout:
     def velocity(self) -> Index:
         """Shape (N, 3)."""
         return self._block(3, 3)
-
-    @cached_property
-    def log_mass(self) -> Index:
-        """Shape (N,)."""
-        return self._block(6, 1)[:, 0]
-
-    @cached_property
-    def acceleration(self) -> Index:
-        """Thrust acceleration, shape (N, 3)."""
-        return self._block(7, 3)
-
-    @cached_property
-    def slack(self) -> Index:
-        """Upper bound of the thrust acceleration's magnitude, shape (N,)."""
-        return self._block(10, 1)[:, 0]
 
     @property
     def landing_error(self) -> int:

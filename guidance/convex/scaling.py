@@ -12,11 +12,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.descent.problem import LandingProblem
 
-Array = NDArray[np.float64]
 _LOOSE = 10.0  # scaled limit that binds no flight worth comparing
 
 

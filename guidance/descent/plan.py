@@ -7,14 +7,13 @@ from enum import Enum
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from guidance.arrays import Array
 from guidance.descent.certificate import Certificate
 from guidance.descent.problem import LandingProblem
 from guidance.descent.residuals import Residuals, fly_residuals
 from guidance.descent.trajectory import Trajectory, no_trajectory
-
-Array = NDArray[np.float64]
 
 
 class PlanStatus(Enum):

@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.lander import Lander
 from guidance.state import State
 from guidance.validation import finite_number, finite_vector
@@ -18,7 +18,7 @@ ROUNDING = 1e-6
 """What rounding may take from a limit: of the distance to the target or 1 m, of the speed or 1 m/s."""
 
 
-def lies_below(start: NDArray[np.float64], target: NDArray[np.float64]) -> bool:
+def lies_below(start: Array, target: Array) -> bool:
     """Whether a start [m] lies below a target's altitude by more than rounding; both of shape (3,)."""
     depth = float(target[2] - start[2])
     return depth > 0.0 and depth > ROUNDING * max(1.0, float(np.linalg.norm(start - target)))
@@ -46,12 +46,12 @@ class LandingProblem:
     """
 
     state: State
-    target: NDArray[np.float64]
+    target: Array
     lander: Lander
-    gravity: NDArray[np.float64]
+    gravity: Array
     glide_slope_limit: float | None = None
     speed_limit: float | None = None
-    target_velocity: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
+    target_velocity: Array = field(default_factory=lambda: np.zeros(3))
 
     def __post_init__(self) -> None:
         """Refuse what no solver should see."""
@@ -85,7 +85,7 @@ class LandingProblem:
         return self.glide_slope_limit is not None and self.glide_slope_limit < math.pi / 2 - 1e-6
 
     @property
-    def offset(self) -> NDArray[np.float64]:
+    def offset(self) -> Array:
         """[m] shape (3,): the start as seen from the target.
 
         One that breaks the altitude or the glide slope by no more than rounding is moved to keep it.
@@ -100,7 +100,7 @@ class LandingProblem:
             offset[2] += outside * math.sin(angle)
         return offset
 
-    def outside_glide_slope(self, vector: NDArray[np.float64]) -> float:
+    def outside_glide_slope(self, vector: Array) -> float:
         """How far a vector from the landing point, shape (3,), lies outside the glide slope; inside: <= 0."""
         if self.glide_slope_limit is None or not self.has_glide_slope:
             return 0.0

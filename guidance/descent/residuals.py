@@ -10,14 +10,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.constants import MOON_GRAVITY
 from guidance.descent.problem import LandingProblem
 from guidance.descent.trajectory import Trajectory
 from guidance.kernel import compile_kernel
-
-Array = NDArray[np.float64]
 
 _BETWEEN = 4  # Runge-Kutta steps per interval, in which the thrust is smooth; each is a sample of the path
 

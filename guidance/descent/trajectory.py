@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from guidance.arrays import Array, Index
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +83,7 @@ class Trajectory:
         """[1/s] share of the mass burnt per second at each node."""
         return np.linalg.norm(self.acceleration, axis=1) / self.exhaust_velocity
 
-    def _mass_between(self, k: NDArray[np.int64], share: Array) -> Array:
+    def _mass_between(self, k: Index, share: Array) -> Array:
         """Mass in interval k: its logarithm is quadratic where the magnitude of acceleration is linear."""
         bend = 0.5 * self.time[1] * (self._flow[k + 1] - self._flow[k]) * share * (1.0 - share)
         return self.mass[k] * (self.mass[k + 1] / self.mass[k]) ** share * np.exp(bend)

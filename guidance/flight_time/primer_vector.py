@@ -9,12 +9,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.descent.problem import LandingProblem
 from guidance.flight_time.primer_equations import LEGS, fly_primer, solve_primer
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,11 +6,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.descent.problem import ROUNDING, LandingProblem
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.convex.clarabel_solver import SolveStatus
 from guidance.convex.condensed import keeps_altitude
 from guidance.convex.constraint_set import ConstraintSet
@@ -14,8 +14,6 @@ from guidance.convex.programme import ConvexSolution, convex_template
 from guidance.convex.scaling import scale_problem
 from guidance.descent.problem import LandingProblem
 from guidance.descent.residuals import FLIGHT_TOLERANCE, pointing_excess
-
-Array = NDArray[np.float64]
 
 _THRUST_TOLERANCE = 5e-4  # relative; half of what a plan promises
 _DIP = FLIGHT_TOLERANCE.thrust_dip

@@ -12,11 +12,13 @@ al., "HALO: hazard-aware landing optimization for autonomous systems", ICRA 2023
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from guidance.arrays import Array
 from guidance.convex.branched_programme import Branching, branched_programme
 from guidance.convex.clarabel_solver import SolveStatus
 from guidance.convex.constraint_set import ConstraintSet
@@ -28,7 +30,6 @@ from guidance.flight_time.time_window import forbidden_by
 from guidance.planning.convex_task import ConvexTask, bounds_hold
 from guidance.validation import finite_number, finite_vector
 
-Array = NDArray[np.float64]
 METHOD = "deferred decision"
 _MOST_REFINEMENTS = 4
 _LEAST_WEIGHT = 1e-2  # in the expected propellant, so that no branch is left without a price
@@ -171,17 +172,20 @@ def _cheapest_alone(
 def _longest_trunk(question: _Question, alone: list[ConvexSolution]) -> tuple[int, list[ConvexSolution], int]:
     """Most nodes that can be shared, the flights that share them, and the solves it took."""
     log_mass = [solution.log_mass for solution in alone]
-    best, flights, solves = 0, alone, 0
-    low, high = 0, question.nodes if len(alone) == 1 else question.nodes - 1
-    while low < high:
-        middle = (low + high + 1) // 2
-        found = question.solve(middle, log_mass)
+    longest, flights, solves = 0, alone, 0
+
+    def shareable(nodes: int) -> bool:
+        nonlocal longest, flights, solves
+        found = question.solve(nodes, log_mass)
         solves += 1
         if found is not None:
-            found, more = question.refine(middle, found, log_mass)
+            found, more = question.refine(nodes, found, log_mass)
             solves += more
         if found is None:
-            high = middle - 1
-        else:
-            low, best, flights = middle, middle, found
-    return best, flights, solves
+            return False
+        longest, flights = nodes, found  # each trunk that can be shared is longer than those before
+        return True
+
+    most = question.nodes if len(alone) == 1 else question.nodes - 1
+    bisect_left(range(most, 0, -1), True, key=shareable)
+    return longest, flights, solves

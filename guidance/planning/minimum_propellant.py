@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.convex.clarabel_solver import SolveStatus
 from guidance.convex.programme import ConvexSolution
 from guidance.flight_time.bracket_search import BracketSearch
@@ -15,8 +15,6 @@ from guidance.flight_time.primer_vector import find_primer_flight
 from guidance.flight_time.search import TimeModel, TimeSearch
 from guidance.flight_time.time_window import TimeWindow, guess_time, time_window
 from guidance.planning.convex_task import MOST_REFINEMENTS, ConvexTask, bounds_hold
-
-Array = NDArray[np.float64]
 
 _COARSE_NODES = 13
 _NEAR_DEAD_TIME = 0.97  # first steps are small where the guess is good

@@ -14,13 +14,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from guidance.arrays import Array
 from guidance.descent.problem import LandingProblem
 from guidance.flight_time.time_window import forbidden_by
 from guidance.planning.convex_task import ConvexTask
 from guidance.planning.minimum_propellant import minimise_over_time
 from guidance.validation import finite_number
-
-Array = NDArray[np.float64]
 
 DEFAULT_NODES = 11
 _COARSE = 1e-4  # tolerance of the search for the shortest useful time, in ln(mass)

@@ -17,8 +17,8 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.descent.plan import Plan, PlanStatus
 from guidance.descent.problem import LandingProblem
 from guidance.descent.trajectory import Trajectory
@@ -38,8 +38,6 @@ _LONG = 2e4  # [m] way beyond which the smoothing is finer
 _COARSE_SMOOTHING = 1e-2  # of full thrust, for a flight to start from
 _GREATEST_LEAST = 1.0 - 5e-4  # of full thrust: an interior-point method needs room between two bounds
 _GREATEST_MIDWAY = 0.98  # of full thrust: an engine without throttle may turn by 23 degrees an interval
-
-Array = NDArray[np.float64]
 
 
 def _parameters(problem: LandingProblem, units: Units, ends: tuple[float, float], smoothing: float) -> Array:

@@ -19,20 +19,18 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.descent.plan import Plan, PlanStatus
 from guidance.descent.problem import LandingProblem
 from guidance.descent.trajectory import Trajectory, no_trajectory
 from guidance.flight_time.time_window import forbidden_by, time_window
+from guidance.golden_section import divide, keep_lower, keep_upper
 from guidance.reference.units import Units
 
 METHOD = "cvxpy"
 _LINEARISATIONS = 6
-_GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 _TIME_TOLERANCE = 2e-3  # relative; the optimum is flat in time
-
-Array = NDArray[np.float64]
 
 
 @lru_cache(maxsize=8)
@@ -182,18 +180,17 @@ def _solve_best_time(problem: LandingProblem, nodes: int) -> _Flight:
     best = flights[at]
     if not best.log_mass.size:
         return replace(best, solves=solves)
-    low, high = float(grid[max(at - 1, 0)]), float(grid[min(at + 1, grid.size - 1)])
-    a = _solve_time(problem, nodes, high - _GOLDEN * (high - low))
-    b = _solve_time(problem, nodes, low + _GOLDEN * (high - low))
+    bracket = divide(float(grid[max(at - 1, 0)]), float(grid[min(at + 1, grid.size - 1)]))
+    a, b = _solve_time(problem, nodes, bracket.first), _solve_time(problem, nodes, bracket.second)
     solves += a.solves + b.solves
-    while high - low > _TIME_TOLERANCE * high:
+    while bracket.high - bracket.low > _TIME_TOLERANCE * bracket.high:
         if a.share < b.share or (math.isinf(a.share) and math.isinf(b.share) and best.time < b.time):
-            high, b = b.time, a
-            a = _solve_time(problem, nodes, high - _GOLDEN * (high - low))
+            bracket, b = keep_lower(bracket), a
+            a = _solve_time(problem, nodes, bracket.first)
             solves += a.solves
         else:
-            low, a = a.time, b
-            b = _solve_time(problem, nodes, low + _GOLDEN * (high - low))
+            bracket, a = keep_upper(bracket), b
+            b = _solve_time(problem, nodes, bracket.second)
             solves += b.solves
         best = min(best, a, b, key=lambda flight: flight.share)
     return replace(best, solves=solves)

@@ -16,16 +16,14 @@ from functools import lru_cache
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.descent.problem import LandingProblem
 
 NonlinearSolver = Literal["fatrop", "ipopt"]
 _GREATEST_TURN = math.cos(math.radians(45.0))  # in one interval, for an engine that cannot stop
 _GLIDE_SMOOTHING = 1e-6  # of the unit of length
 _MOST_ITERATIONS: dict[NonlinearSolver, int] = {"fatrop": 200, "ipopt": 500}
-
-Array = NDArray[np.float64]
 
 
 def fatrop_present() -> bool:

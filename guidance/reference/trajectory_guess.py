@@ -6,12 +6,10 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.descent.problem import LandingProblem
 from guidance.descent.trajectory import Trajectory
-
-Array = NDArray[np.float64]
 
 _ON_AXIS = 1e-6  # horizontal extent over the whole below which a descent counts as vertical
 _SWING = 0.01  # of full thrust

@@ -15,11 +15,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.descent.plan import Plan
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

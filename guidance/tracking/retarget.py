@@ -8,13 +8,11 @@ starts and ends at rest, added to the reference, keeps its time and its vertical
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.lander import Lander
 from guidance.tracking.reference import TrackingReference, make_reference
 from guidance.validation import finite_vector
-
-Array = NDArray[np.float64]
 
 _UNFELT = 0.05
 """[m/s^2] beyond the pointing limit that the feedback makes up for: sampled, a coasting engine's thrust is

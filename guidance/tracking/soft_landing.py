@@ -16,8 +16,9 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from guidance.arrays import Array
 from guidance.constants import MOON_GRAVITY
 from guidance.descent.plan import Plan, PlanStatus
 from guidance.descent.problem import LandingProblem, lies_below
@@ -26,8 +27,6 @@ from guidance.pdg.solve import PlanningMethod, replan
 from guidance.state import State
 from guidance.tracking.reference import TrackingReference, make_reference, states_at
 from guidance.validation import finite_number, finite_vector
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from hda.flight.episode import Flight, Step, advance, begin_flight, observe
 from hda.flight.outcome import Outcome
 from hda.task.observation import Observation
@@ -21,6 +22,7 @@ from rl.environment.dispersions import Dispersions
 from rl.environment.encoding import CURVED, LATENT_BOUND, LAYOUTS, Layout, encode_flight, encode_observation
 from rl.environment.episode_info import describe_episode
 from rl.environment.episode_source import EpisodeSource
+from rl.inference.arrays import Array32
 from rl.inference.latent import LATENT_SIZE
 
 ObsType = TypeVar("ObsType")
@@ -28,7 +30,7 @@ _DISPERSION_NAMES = tuple(entry.name for entry in fields(Dispersions))
 _OPTIONS = ("scenario", *_DISPERSION_NAMES)
 
 
-class LandingEnv(gymnasium.Env[ObsType, NDArray[np.float32]], Generic[ObsType]):
+class LandingEnv(gymnasium.Env[ObsType, Array32], Generic[ObsType]):
     """What the two environments share.
 
     **Action**, Box(-1, 1, (5,), float32), linear between the ends:
@@ -100,7 +102,7 @@ class LandingEnv(gymnasium.Env[ObsType, NDArray[np.float32]], Generic[ObsType]):
         self._observation: Observation | None = None
 
     @abstractmethod
-    def encode(self, observation: Observation, nominal_target: NDArray[np.float64]) -> ObsType:
+    def encode(self, observation: Observation, nominal_target: Array) -> ObsType:
         """Turn an observation into a new element of the observation space."""
 
     def reset(
@@ -131,7 +133,7 @@ class LandingEnv(gymnasium.Env[ObsType, NDArray[np.float32]], Generic[ObsType]):
         self.steps = []
         return self._look(begin_flight(scenario))
 
-    def step(self, action: NDArray[np.float32]) -> tuple[ObsType, float, bool, bool, dict[str, Any]]:
+    def step(self, action: Array32) -> tuple[ObsType, float, bool, bool, dict[str, Any]]:
         """Fly one decision.
 
         Raises:
@@ -179,7 +181,7 @@ class LandingEnv(gymnasium.Env[ObsType, NDArray[np.float32]], Generic[ObsType]):
         return seen, describe_episode(self.scenario, flight, self.steps)
 
 
-class LunarHDAEnv(LandingEnv[NDArray[np.float32]]):
+class LunarHDAEnv(LandingEnv[Array32]):
     """`LunarHDA-v0`: the 44 numbers that the agents see; float32, clipped to finite bounds.
 
     x = (value - center) / scale; where "curved", asinh(x) / 2: fine near the ground and coarse above.
@@ -227,7 +229,7 @@ class LunarHDAEnv(LandingEnv[NDArray[np.float32]]):
         low, high = np.concatenate([self.layout.low, -bound]), np.concatenate([self.layout.high, bound])
         self.observation_space = spaces.Box(low, high, dtype=np.float32)
 
-    def encode(self, observation: Observation, nominal_target: NDArray[np.float64]) -> NDArray[np.float32]:
+    def encode(self, observation: Observation, nominal_target: Array) -> Array32:
         """The 44 numbers."""
         latent = self._encoder.encode(observation.safety_map)
         return encode_observation(self.layout, observation, nominal_target, latent)
@@ -263,7 +265,7 @@ class LunarHDAMapEnv(LandingEnv[dict[str, Any]]):
             map=spaces.Box(0, 255, (1, pixels, pixels), np.uint8),
         )
 
-    def encode(self, observation: Observation, nominal_target: NDArray[np.float64]) -> dict[str, Any]:
+    def encode(self, observation: Observation, nominal_target: Array) -> dict[str, Any]:
         """The flight and the map."""
         return {
             "flight": encode_flight(CURVED, observation, nominal_target),

@@ -7,32 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hda.flight.palette import COLORS, line_style, marker_style
 from studies.campaign.score import label_measure
 from studies.compare.differences import PairedDifference
-from studies.compare.figures import COLORS
 from studies.compare.histograms import MeasureHistograms
 from studies.compare.table import PolicySummary
 from studies.paper import PAPER_ROWS
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
-
-DASHES = ("solid", "dash", "dot")
-SYMBOLS = ("circle", "square", "diamond")
-
-
-def line_style(index: int) -> dict[str, Any]:
-    """Colour and dash of the policy of a number; both together are its own up to 24 policies."""
-    return {
-        "color": COLORS[index % len(COLORS)],
-        "dash": DASHES[index // len(COLORS) % len(DASHES)],
-        "width": 2,
-    }
-
-
-def _marker(index: int) -> dict[str, Any]:
-    symbol = SYMBOLS[index // len(COLORS) % len(SYMBOLS)]
-    return {"color": COLORS[index % len(COLORS)], "symbol": symbol, "size": 10}
 
 
 def draw_ratio_against_propellant(summaries: Sequence[PolicySummary]) -> Figure:
@@ -49,7 +32,7 @@ def draw_ratio_against_propellant(summaries: Sequence[PolicySummary]) -> Figure:
                 error_x=_bars([(propellant.estimate, propellant.low, propellant.high)]),
                 error_y=_bars([(100.0 * safe.estimate, 100.0 * safe.low, 100.0 * safe.high)]),
                 mode="markers",
-                marker=_marker(index),
+                marker=marker_style(index),
                 name=summary.policy,
             )
         )

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hda.flight.episode import ground_point
+from hda.flight.palette import COLORS
+from hda.flight.picture import draw_ground_track
 from hda.flight.record import EpisodeRecord
 from hda.task.observation import Observation
-from studies.compare.figures import COLORS, draw_ground_track
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hda.flight.palette import line_style
 from studies.campaign.points import Rows
-from studies.compare.charts import line_style
 from studies.statistics.ratios import wilson_interval
 
 if TYPE_CHECKING:

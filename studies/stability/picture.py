@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hda.flight.palette import COLORS
 from hda.task.presets import Preset
-from studies.compare.figures import COLORS
 from studies.stability.held_loop import Gains, closed_margins, least_safe_time, sampled_margins, stable_above
 from studies.stability.sampled_flight import flight_powers
 from studies.stability.sweep import POSITION_GAINS, VELOCITY_GAINS, Requirement, descend

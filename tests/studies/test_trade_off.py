@@ -26,8 +26,7 @@ from studies.trade_off.weights import SWEEP, change_weight, sweep_name, sweep_pa
 @pytest.fixture(autouse=True)
 def forgetful_registry(monkeypatch: pytest.MonkeyPatch) -> None:
     hda.policy_names()
-    monkeypatch.setattr(registry, "_entries", dict(registry._entries))
-    monkeypatch.setattr(registry, "_paths", {})
+    monkeypatch.setattr(registry, "REGISTRY", registry.REGISTRY.copy())
 
 
 def row(name: str, safe: float, burnt: float, privileged: bool = False) -> TradeOffRow:
@@ -86,23 +85,20 @@ def test_a_wrong_weight_is_no_policy(path: str) -> None:
 @pytest.fixture(scope="module")
 def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
     hda.policy_names()
-    kept = dict(registry._entries), dict(registry._paths)
     folder = tmp_path_factory.mktemp("trade_off")
-    run_trade_off(
-        TradeOff(
-            presets=("paper",),
-            policies=("no-divert", "single-divert", "oracle"),
-            weights=("commit_time",),
-            episodes=10,
-            sweep_episodes=2,
-            workers=1,
-            out=folder,
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(registry, "REGISTRY", registry.REGISTRY.copy())
+        run_trade_off(
+            TradeOff(
+                presets=("paper",),
+                policies=("no-divert", "single-divert", "oracle"),
+                weights=("commit_time",),
+                episodes=10,
+                sweep_episodes=2,
+                workers=1,
+                out=folder,
+            )
         )
-    )
-    registry._entries.clear()
-    registry._entries.update(kept[0])
-    registry._paths.clear()
-    registry._paths.update(kept[1])
     return folder
 
 

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from guidance import PAPER_LANDER, State
 from guidance.convex import constraints
 from guidance.convex.clarabel_solver import SolveStatus
-from guidance.convex.condensed import CondensedLayout, burnt_mass, expand, keeps_altitude, landing_moments
+from guidance.convex.condensed import burnt_mass, expand, keeps_altitude, landing_moments
 from guidance.convex.constraint_set import ConstraintSet
-from guidance.convex.layout import Layout
+from guidance.convex.layout import CondensedLayout, Layout
 from guidance.convex.programme import convex_template
 from guidance.convex.scaling import scale_problem
 from guidance.descent.problem import LandingProblem
