@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from plotly.graph_objects import Figure
 
 
-
 def draw_ratio_against_propellant(summaries: Sequence[PolicySummary]) -> Figure:
     """Safe ratio against propellant, with both intervals; the paper's points are open diamonds."""
     from plotly.graph_objects import Figure, Scatter

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from hda.flight.episode import fly
 from hda.flight.palette import COLORS
@@ -12,6 +13,9 @@ from studies.campaign.monte_carlo import Study
 from studies.campaign.score import label_measure
 from studies.compare.histograms import MeasureHistograms
 from studies.compare.scores import StudyScores
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _PANELS = (
     "reward",
@@ -28,7 +32,7 @@ def draw_figures(out: Path, study: Study, scores: StudyScores) -> None:
     figures, trajectories = out / "figures", out / "trajectories"
     figures.mkdir(exist_ok=True)
     trajectories.mkdir(exist_ok=True)
-    draw_histograms(figures / "histograms.png", study, scores.histograms)
+    draw_histograms(study, scores.histograms).savefig(figures / "histograms.png", dpi=110)
     scenario = sample_scenario(study.preset, study.study_seed, scores.hardest, study.split)
     for name in study.policies:
         record = fly(study.make_policy(name), scenario)
@@ -37,7 +41,7 @@ def draw_figures(out: Path, study: Study, scores: StudyScores) -> None:
         save_flight(trajectories / f"{stem}.npz", record)
 
 
-def draw_histograms(path: Path, study: Study, histograms: MeasureHistograms) -> None:
+def draw_histograms(study: Study, histograms: MeasureHistograms) -> Figure:
     """Draw the distributions that the paper shows, as step histograms of equal bins."""
     from matplotlib.figure import Figure
 
@@ -54,4 +58,4 @@ def draw_histograms(path: Path, study: Study, histograms: MeasureHistograms) -> 
     axes[-1].axis("off")
     axes[-1].legend(handles, labels, loc="center", frameon=False)
     figure.suptitle(f"preset {study.preset.name}, {study.episodes} episodes; end bins hold what lies beyond")
-    figure.savefig(path, dpi=110)
+    return figure

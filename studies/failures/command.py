@@ -149,7 +149,8 @@ def show_failures(options: Failures) -> dict[str, list[Failure]]:
         if options.figures:
             from studies.failures.picture import draw_failure
 
-            draw_failure(out / picture_name(name, episode), record, describe_failure(failure))
+            figure = draw_failure(record, describe_failure(failure))
+            figure.savefig(out / picture_name(name, episode), dpi=75)
     rows = [(name, failure) for name, failures in explained.items() for failure in failures]
     write_csv(out / "failures.csv", COLUMNS, rows)
     flown = {name: len(failed[name]) for name in chosen}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import textwrap
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,12 +15,13 @@ from hda.task.observation import Observation
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 _LOOKS = 4  # last looks that are shown
 _NEAR = 15.0  # [m] around the touchdown that is shown
 
 
-def draw_failure(path: Path, record: EpisodeRecord, words: str) -> None:
+def draw_failure(record: EpisodeRecord, words: str) -> Figure:
     """Draw the ground track, speed and height, the ground at the touchdown, and the last looks."""
     from matplotlib.figure import Figure
 
@@ -35,7 +35,7 @@ def draw_failure(path: Path, record: EpisodeRecord, words: str) -> None:
         _draw_look(figure.add_subplot(grid[1, 3 * k : 3 * k + 3]), record, observation)
     episode = f"{record.policy}, {record.scenario.preset.name}, episode {record.scenario.streams.episode}: "
     figure.suptitle("\n".join(textwrap.wrap(episode + words, 150)), fontsize="medium")
-    figure.savefig(path, dpi=75)
+    return figure
 
 
 def _draw_descent(axis: Axes, record: EpisodeRecord) -> None:

@@ -198,7 +198,7 @@ def study_memory(options: MemoryStudy) -> tuple[GroupRow, ...]:
     write_csv(out / "memory.csv", COLUMNS, rows)
     text = markdown(rows, sentences)
     (out / "memory.md").write_text(text)
-    draw_memory(out / "memory.png", rows, scores)
+    draw_memory(rows, scores).savefig(out / "memory.png", dpi=110)
     sources_told = {"sources": [str(source) for source in sources]}
     write_provenance(out / "provenance.json", describe_run(options) | sources_told)
     console.print(text, markup=False, highlight=False, soft_wrap=True)

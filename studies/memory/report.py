@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 from studies.columns import Column, Output, markdown_lines
 from studies.compare.figures import COLORS
 from studies.memory.answer import MEASURES, GroupRow
 from studies.memory.scores import AgentScore
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _TO = " to "
 
@@ -61,7 +64,7 @@ def markdown(rows: Sequence[GroupRow], sentences: Sequence[str]) -> str:
     return "\n".join([*lines, "", *(f"- {sentence}" for sentence in sentences)]) + "\n"
 
 
-def draw_memory(path: Path, rows: Sequence[GroupRow], scores: Sequence[AgentScore]) -> None:
+def draw_memory(rows: Sequence[GroupRow], scores: Sequence[AgentScore]) -> Figure:
     """Draw each preset's agents: every seed, the interquartile mean and its interval."""
     from matplotlib.figure import Figure
 
@@ -87,4 +90,4 @@ def draw_memory(path: Path, rows: Sequence[GroupRow], scores: Sequence[AgentScor
         axis.grid(axis="y", alpha=0.25)
     grid[0, 0].set_ylabel("safe site [%]")
     figure.suptitle("every seed, and the interquartile mean with its 95 % interval")
-    figure.savefig(path, dpi=110)
+    return figure

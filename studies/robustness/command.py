@@ -148,7 +148,8 @@ def write_sweeps(
         if options.figures:
             from studies.robustness.picture import draw_sweep
 
-            draw_sweep(out / f"{sweep.factor.name}.png", sweep.factor.label, sweep.own, sweep.levels)
+            figure = draw_sweep(sweep.factor.label, sweep.own, sweep.levels)
+            figure.savefig(out / f"{sweep.factor.name}.png", dpi=90)
     found = [(b, studies[_label(FACTORS[b.factor], b.level)]) for sweep in sweeps for b in sweep.breaks]
     explained = [
         (b, explain_break(b, study)) for b, study in track(found, "explaining breaks", transient=True)

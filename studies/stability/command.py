@@ -87,7 +87,7 @@ def study_stability(options: Stability) -> tuple[list[MarginRow], list[GainRow]]
     if options.figures:
         from studies.stability.picture import draw_stability
 
-        draw_stability(out / "stability.png", preset, options.required)
+        draw_stability(preset, options.required).savefig(out / "stability.png", dpi=110)
     title = f"ZEM/ZEV, control period {period:g} s; speeds in m/s, median / worst clock phase"
     Console(width=max(Console().width, 176)).print(console_table(GAIN_COLUMNS, gain_rows, title))
     console = Console()

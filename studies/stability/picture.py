@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,14 +15,15 @@ from studies.stability.sweep import POSITION_GAINS, VELOCITY_GAINS, Requirement,
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
 _SHOWN = (Gains(6.0, 2.0), Gains(5.0, 1.0), Gains(7.0, 1.0), Gains(5.0, 3.0), Gains(7.0, 3.0))
 _POINTS = 33
 
 
-def draw_stability(path: Path, preset: Preset, required: Requirement) -> None:
-    """Draw and save the figure."""
+def draw_stability(preset: Preset, required: Requirement) -> Figure:
+    """Draw the maps and the margins; the caller saves the figure."""
     from matplotlib.figure import Figure
 
     period = preset.rules.control_period
@@ -60,7 +60,7 @@ def draw_stability(path: Path, preset: Preset, required: Requirement) -> None:
         f"ZEM/ZEV, control period {period:g} s; margins: {math.degrees(required.phase_margin):g} deg and a "
         f"factor {required.gain_margin:g}; worst over the phase of the clock; no thrust limit"
     )
-    figure.savefig(path, dpi=110)
+    return figure
 
 
 def _draw_map(axis: Axes, values: NDArray[np.float64], title: str, levels: tuple[float, ...]) -> None:

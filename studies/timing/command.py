@@ -77,7 +77,7 @@ def study_timing(options: Timing) -> list[Summary]:
     if options.figures:
         from studies.timing.picture import draw_timing
 
-        draw_timing(out / "timing.png", methods, calls)
+        draw_timing(methods, calls).savefig(out / "timing.png", dpi=110)
     feasible = sum(case.feasible for case in cases)
     title = f"{feasible} feasible and {len(cases) - feasible} infeasible cases"
     Console(width=max(Console().width, 150)).print(console_table(SUMMARY_COLUMNS, summaries, title))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,13 +10,15 @@ import numpy as np
 from hda.flight.palette import COLORS
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from studies.timing.measures import Call
     from studies.timing.methods import Method
 
 _LEAST_REGRET = 1e-2  # [g] shown for this and less
 
 
-def draw_timing(path: Path, methods: Sequence[Method], calls: Sequence[Call]) -> None:
+def draw_timing(methods: Sequence[Method], calls: Sequence[Call]) -> Figure:
     """Draw how many calls are done by a time, and median regret against median time."""
     from matplotlib.figure import Figure
 
@@ -63,4 +64,4 @@ def draw_timing(path: Path, methods: Sequence[Method], calls: Sequence[Call]) ->
     cost.set_title("round: free time of flight; square: fixed; number: nodes", fontsize="medium")
     for axis in (done, cost):
         axis.grid(alpha=0.25, which="both")
-    figure.savefig(path, dpi=110)
+    return figure

@@ -159,7 +159,7 @@ def run_trade_off(options: TradeOff) -> tuple[list[TradeOffRow], list[Bounds]]:
     if options.figures:
         from studies.trade_off.picture import draw_trade_off
 
-        draw_trade_off(out / "trade-off.png", rows, bounds)
+        draw_trade_off(rows, bounds).savefig(out / "trade-off.png", dpi=85)
     write_provenance(out / "provenance.json", describe_run(options))
     return rows, bounds
 

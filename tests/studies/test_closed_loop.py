@@ -22,8 +22,7 @@ from studies.closed_loop.laws import law_name, law_path
 @pytest.fixture(autouse=True)
 def forgetful_registry(monkeypatch: pytest.MonkeyPatch) -> None:
     hda.policy_names()
-    monkeypatch.setattr(registry, "_entries", dict(registry._entries))
-    monkeypatch.setattr(registry, "_paths", {})
+    monkeypatch.setattr(registry, "REGISTRY", registry.REGISTRY.copy())
 
 
 def options(out: Path, **changes) -> ClosedLoop:
