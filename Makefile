@@ -2,20 +2,21 @@
 #
 #   PYTHON=python3.12 make test            another interpreter
 #   make compare ARGS="--episodes 100"     arguments of studies.compare
-#   make test ARGS="-k lander"             arguments of pytest (also for test-all)
+#   make test ARGS="-k lander"             arguments of pytest (also for test-all and test-minimum)
 
 PYTHON ?= python3
 ARGS ?=
 VENV := .venv
 BIN := $(VENV)/bin
 PIP_INSTALL := $(BIN)/python -m pip --disable-pip-version-check install
+MINIMUM := .venv-minimum
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help setup lint test test-all compare bench docs clean
+.PHONY: help setup lint test test-all test-minimum compare bench docs clean
 
 help:  ## list the targets
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-9s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
 setup: $(VENV)/.installed-dev  ## create .venv with everything that a developer needs
 
@@ -31,6 +32,9 @@ test: lint  ## lint, then the fast tests
 test-all: lint  ## lint, then every test
 	$(BIN)/pytest -n 2 $(ARGS)
 
+test-minimum: $(MINIMUM)/.installed  ## the fast tests, on the least versions of the libraries
+	$(MINIMUM)/bin/pytest -m "not slow and not browser" -n 2 $(ARGS)
+
 compare: $(VENV)/.installed  ## fly every policy on the same episodes and print the table
 	$(BIN)/python -m studies.compare --resume $(ARGS)
 
@@ -42,7 +46,7 @@ docs: $(VENV)/.installed-docs  ## build the documentation into site/; a warning 
 	@echo "open site/index.html"
 
 clean:  ## remove .venv, caches and build products; results and the per-user terrain cache stay
-	rm -rf $(VENV) build dist site .cache .pytest_cache .ruff_cache .hypothesis .import_linter_cache
+	rm -rf $(VENV) $(MINIMUM) build dist site .cache .pytest_cache .ruff_cache .hypothesis .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(BIN)/python:
@@ -65,3 +69,9 @@ $(VENV)/.installed-dev: pyproject.toml | $(BIN)/python
 $(VENV)/.installed-docs: pyproject.toml | $(BIN)/python
 	$(PIP_INSTALL) -e '.[docs]'
 	@touch $(VENV)/.installed $@
+
+$(MINIMUM)/.installed: pyproject.toml tests/minimum_versions.py
+	"$(PYTHON)" -m venv --clear $(MINIMUM)
+	$(MINIMUM)/bin/python tests/minimum_versions.py > $(MINIMUM)/minimum.txt
+	$(MINIMUM)/bin/python -m pip --disable-pip-version-check install -c $(MINIMUM)/minimum.txt -e '.[dev]'
+	@touch $@

@@ -1,4 +1,4 @@
-"""Plan one descent, check it by flying it, draw it, and ask what happens where the target is out of reach.
+"""Plan one descent, check it by flying it, and ask what happens where the target is out of reach.
 
 Run: python examples/solve_pdg.py
 """
@@ -15,7 +15,7 @@ TARGET = [0.0, 0.0, 50.0]
 def main() -> None:
     """Print what a guidance engineer would look at first."""
     plan = guidance.solve_pdg(STATE, TARGET)
-    say(f"free time: {plan.propellant:.2f} kg in {plan.time_of_flight:.2f} s, {plan.solves} fine solves")
+    say(f"free time: {plan.propellant:.2f} kg in {plan.time_of_flight:.2f} s, {plan.solves} conic solves")
     say(f"flown through the true motion it misses by {plan.residuals.position:.1e} m")
 
     upright = guidance.Lander(min_thrust=800.0, pointing_limit=math.radians(35.0))
@@ -24,7 +24,7 @@ def main() -> None:
 
     late = plan.position[20].tolist() + plan.velocity[20].tolist() + [float(plan.mass[20])]
     replanned = guidance.solve_pdg(late, TARGET, guess=plan)
-    say(f"replanned on the way: {replanned.time_of_flight:.2f} s left, {replanned.solves} fine solve(s)")
+    say(f"replanned on the way: {replanned.time_of_flight:.2f} s left, {replanned.solves} conic solves")
 
     far = [2500.0, 0.0, 50.0]
     try:

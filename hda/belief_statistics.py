@@ -7,17 +7,20 @@ python -m hda.belief_statistics --write counts, and writes hda/policies/surround
 from __future__ import annotations
 
 import sys
+from dataclasses import dataclass
 
 import numpy as np
+import tyro
 from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.console import tolerate_encoding
+from guidance.validation import finite_number
 from hda.ground.library import Ground, load_tile
 from hda.policies.belief import LEVEL_SHARES, LEVELS
 from hda.policies.surroundings import DISTANCE_EDGES, TABLE, safe_share_table, squared_distance
 from hda.task.presets import PRESETS
 
-TILES = range(40)
 LOOKS_PER_TILE = 6
 LOOK_WIDTHS = (187.0, 155.0, 118.0, 72.0)
 """[m] of the first four looks of a fuel-optimal descent."""
@@ -26,7 +29,24 @@ _MARGIN = 36  # [m] around the widest look
 _BORDER = 10  # [m] of a tile's edge that Algorithm 1 cannot assess
 
 
-def level_shares(probability: NDArray[np.float32]) -> NDArray[np.float64]:
+@dataclass(frozen=True)
+class BeliefStatistics:
+    """Command line of the count.
+
+    Attributes:
+        tiles: training tiles that are counted of each ground, the first ones.
+        write: write hda/policies/surroundings.csv instead of comparing with it.
+    """
+
+    tiles: int = 40
+    write: bool = False
+
+    def __post_init__(self) -> None:
+        """Check the number of tiles."""
+        finite_number("tiles", self.tiles, at_least=1)
+
+
+def level_shares(probability: NDArray[np.float32]) -> Array:
     """Share of cells nearest to each level of V_P, shape (levels,)."""
     edges = 0.5 * (LEVELS[1:] + LEVELS[:-1])
     edges[[0, -1]] = 1e-3, 0.999
@@ -34,9 +54,7 @@ def level_shares(probability: NDArray[np.float32]) -> NDArray[np.float64]:
     return counts / probability.size
 
 
-def count_surroundings(
-    safe: NDArray[np.bool_], width: float, center: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def count_surroundings(safe: NDArray[np.bool_], width: float, center: Array) -> tuple[Array, Array]:
     """Cells and safe cells in each pair of distance classes around one noiseless look, shape (k, k) each."""
     half = round(max(LOOK_WIDTHS) / 2.0) + _MARGIN
     corner = np.floor(center).astype(int) - half
@@ -54,8 +72,8 @@ def count_surroundings(
     return cells, good
 
 
-def measure() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Level shares and the safe-share table, over the training tiles of each ground that presets use.
+def measure(tiles: int) -> tuple[Array, Array]:
+    """Level shares and the safe-share table, over the first training tiles of each ground that presets use.
 
     Pairs of classes that never occur take the value of pairs with the same quotient of distances: one half.
     """
@@ -64,7 +82,7 @@ def measure() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     levels = np.zeros(LEVELS.size)
     for ground in dict.fromkeys(Ground(preset.terrain, preset.criteria) for preset in PRESETS.values()):
         rng = np.random.default_rng(0)
-        for number in TILES:
+        for number in range(tiles):
             tile = load_tile(ground, number, "train")
             levels += level_shares(tile.probability[_BORDER:-_BORDER, _BORDER:-_BORDER])
             for _ in range(LOOKS_PER_TILE):
@@ -78,11 +96,12 @@ def measure() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 def main() -> None:
     """Print, or write, what was counted."""
     tolerate_encoding()
-    levels, table = measure()
+    options = tyro.cli(BeliefStatistics, description=__doc__)
+    levels, table = measure(options.tiles)
     out = sys.stdout.write
     out("levels of V_P: " + " ".join(f"{share:.4f}" for share in levels) + "\n")
     out("        in use: " + " ".join(f"{share:.4f}" for share in LEVEL_SHARES) + "\n")
-    if "--write" in sys.argv[1:]:
+    if options.write:
         np.savetxt(TABLE, table, fmt="%.5f", delimiter=",")
         out(f"wrote {TABLE}\n")
         return

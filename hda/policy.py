@@ -7,14 +7,14 @@ from enum import StrEnum
 from typing import TYPE_CHECKING, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.tracking.reference import TrackingReference
 from guidance.validation import finite_number, finite_vector
 from hda.task.observation import Observation, ScenarioView
 
 if TYPE_CHECKING:
-    from hda.ground.tile import Tile
+    from hda.task.scenario import Scenario
 
 Memory = TypeVar("Memory")
 
@@ -93,7 +93,7 @@ class Decision:
         ValueError: the site is not three finite numbers.
     """
 
-    site: NDArray[np.float64]
+    site: Array
     command: Command
     status: DecisionStatus = DecisionStatus.NOMINAL
 
@@ -124,7 +124,7 @@ class Policy(Protocol[Memory]):
 
 @runtime_checkable
 class PrivilegedPolicy(Protocol):
-    """A policy that sees the true map. `fly` gives it the truth; every table marks it."""
+    """A policy that sees the true map. `fly` gives it the scenario; every table marks it."""
 
     @property
     def privileged(self) -> bool:
@@ -136,6 +136,6 @@ class PrivilegedPolicy(Protocol):
         """Name in tables."""
         ...
 
-    def informed(self, truth: Tile) -> Policy:
-        """Make the policy that knows this tile."""
+    def informed(self, truth: Scenario) -> Policy:
+        """Make the policy that knows this scenario: the true map, and the true state at its start."""
         ...

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from hda.task.observation import Observation, ScenarioView
 
-Site = NDArray[np.float64]
+Site = Array
 
 
 class SiteSelection(Protocol):

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 import tyro
-from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.console import tolerate_encoding
 
 if TYPE_CHECKING:
@@ -85,7 +85,7 @@ class ComparisonFigure:
     Attributes:
         agent: name of the left policy.
         other: name of the right policy.
-        search: episodes of the validation tiles to search; the first is shown if none parts them.
+        search: episodes of the validation tiles to search; it is an error if none parts them.
         preset: setting.
         study_seed: seed of the study.
         out: picture to write.
@@ -107,7 +107,7 @@ Command = (
 )
 
 
-def moving_average(values: NDArray[np.float64], window: int) -> NDArray[np.float64]:
+def moving_average(values: Array, window: int) -> Array:
     """Mean of the last `window` values, or of as many as there are."""
     total = np.cumsum(np.insert(values, 0, 0.0))
     ends = np.arange(1, len(values) + 1)
@@ -195,49 +195,32 @@ def draw_gains(options: GainsFigure) -> Figure:
 
 
 def draw_comparison(options: ComparisonFigure) -> Figure:
-    """Ground track over the true safety map, vertical speed and thrust of two policies on one episode."""
-    number = 0
+    """Ground track over the true safety map, velocity and thrust of two policies on one episode.
+
+    Raises:
+        ValueError: on none of the episodes does the agent land safely and the other not.
+    """
+    from hda.flight.picture import draw_ground_track, draw_thrust, draw_velocity
+
+    names = (options.agent, options.other)
     for episode in range(options.search):
-        pair = [
-            _fly(name, options.preset, options.study_seed, episode).outcome.safe_site
-            for name in (options.agent, options.other)
-        ]
-        if pair == [True, False]:
-            number = episode
+        records = [_fly(name, options.preset, options.study_seed, episode) for name in names]
+        if [record.outcome.safe_site for record in records] == [True, False]:
             break
+    else:
+        raise ValueError(
+            f"on none of {options.search} episodes does {options.agent} land on safe ground and"
+            f" {options.other} not; a greater --search may find one"
+        )
     figure = _figure(10.0, 8.0)
     panels: Any = figure.subplots(3, 2, height_ratios=[2.2, 1, 1])
-    for column, name in enumerate((options.agent, options.other)):
-        _draw_flight(panels[:, column], _fly(name, options.preset, options.study_seed, number), name)
-    figure.suptitle(f"episode {number}")
+    for (ground, speed, thrust), record in zip(panels.T, records, strict=True):
+        draw_ground_track(ground, record)
+        ground.set_title(f"{record.policy}: {record.outcome.ending}")
+        draw_velocity(speed, record)
+        draw_thrust(thrust, record)
+    figure.suptitle(f"episode {episode}")
     return figure
-
-
-def _draw_flight(panels: Any, record: EpisodeRecord, name: str) -> None:
-    from matplotlib.patches import Rectangle
-
-    ground, speed, thrust = panels
-    tile = record.scenario.tile.deterministic
-    extent = (0, tile.shape[1], 0, tile.shape[0])
-    ground.imshow(tile, cmap="gray", origin="lower", extent=extent, vmin=0, vmax=1)
-    ground.plot(record.position[:, 0], record.position[:, 1], color="tab:red")
-    for observation in record.observations:
-        corner = observation.target[:2] - 0.5 * observation.width
-        side = observation.width
-        ground.add_patch(
-            Rectangle((corner[0], corner[1]), side, side, fill=False, color="tab:red", alpha=0.4)
-        )
-    x, y = record.scenario.nominal_target[:2]
-    ground.set_xlim(x - 260, x + 260)
-    ground.set_ylim(y - 260, y + 260)
-    ground.set_title(f"{name}: {record.outcome.ending}")
-    speed.plot(record.time, record.velocity)
-    speed.legend(["east", "north", "up"], ncols=3)
-    speed.set_ylabel("velocity [m/s]")
-    magnitude = np.linalg.norm(record.thrust, axis=1)
-    thrust.step(record.time[:-1], magnitude, where="post")
-    thrust.set_ylabel("thrust [N]")
-    thrust.set_xlabel("time [s]")
 
 
 def _fly(name: str, preset: str, study_seed: int, episode: int) -> EpisodeRecord:

@@ -1,24 +1,32 @@
-"""Measure the speed of the inner loops: a decision step, a tile, a safety map; after warm-up, in one run."""
+"""Measure the speed of the inner loops: a decision step, a tile, a safety map; after warm-up, in one run.
+
+What must not grow is printed as ratios too, with the limits that they keep: they mean the same on every
+machine.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from time import perf_counter
 
 import numpy as np
 import tyro
 from rich.console import Console
-from rich.table import Table
 
 from guidance import solve_pdg
 from guidance.console import tolerate_encoding
 from guidance.descent.residuals import fly_residuals
 from guidance.validation import finite_number
-from hda.flight.episode import advance, begin_flight, observe
+from hda.flight.episode import fly_legs
 from hda.policy import PrivilegedPolicy
 from hda.registry import make_policy
 from hda.task.scenario import sample_scenario
-from studies.campaign.command_line import one_line_errors
+from studies.campaign.command_line import one_line_errors, open_folder
+from studies.campaign.provenance import describe_run, write_provenance
+from studies.columns import Column, console_table, write_csv
+from studies.speed_ratios import COLUMNS as RATIO_COLUMNS
+from studies.speed_ratios import SpeedRatio, measure_ratios
 from studies.terrain_timing import measure_terrain
 
 
@@ -31,12 +39,37 @@ class Bench:
         preset: the setting.
         episodes: episodes that are flown for the decision step.
         repeats: repetitions of the terrain work.
+        out: folder for results.
     """
 
     policy: str = "single-divert"
     preset: str = "paper"
     episodes: int = 200
     repeats: int = 5
+    out: Path = Path("results/bench")
+
+
+@dataclass(frozen=True)
+class Work:
+    """How long one piece of work takes by the clock.
+
+    Attributes:
+        name: what was done.
+        median: [s] the middle one.
+        high: [s] 99 % quantile; of work on terrain, which is repeated seldom, the greatest.
+    """
+
+    name: str
+    median: float
+    high: float
+
+
+COLUMNS: tuple[Column[Work], ...] = (
+    Column("work", "work", lambda work: work.name, words=True),
+    Column("median_ms", "median", lambda work: 1e3 * work.median, digits=3, unit="ms"),
+    Column("high_ms", "99 %", lambda work: 1e3 * work.high, digits=3, unit="ms"),
+)
+"""The times: times.csv and the console read this list."""
 
 
 def measure_steps(options: Bench) -> dict[str, np.ndarray]:
@@ -53,18 +86,9 @@ def measure_steps(options: Bench) -> dict[str, np.ndarray]:
     for episode in range(-warm_up, options.episodes):
         scenario = sample_scenario(options.preset, 0, episode % options.episodes, "tuning")
         memory = policy.begin(scenario.view, scenario.streams.policy())
-        flight, ended = begin_flight(scenario), False
-        while not ended:
-            start = perf_counter()
-            observation = observe(scenario, flight)
-            looked = perf_counter()
-            decision, memory = policy.decide(observation, memory)
-            decided = perf_counter()
-            step = advance(scenario, flight, decision)
-            flown = perf_counter()
-            flight, ended = step.flight, step.outcome is not None
-            if episode >= 0:
-                times.append((looked - start, decided - looked, flown - decided))
+        legs = list(fly_legs(scenario, policy.decide, memory))
+        if episode >= 0:
+            times += [(leg.look_time, leg.decision_time, leg.flight_time) for leg in legs]
     looks, decisions, flights = np.array(times).T
     return {
         "look": looks,
@@ -91,18 +115,27 @@ def measure_plans(options: Bench) -> dict[str, np.ndarray]:
     return {"plan (solve_pdg)": plans, "of which the flight that checks it": checks}
 
 
-def bench(options: Bench) -> None:
-    """Measure and print."""
+def bench(options: Bench) -> tuple[list[Work], list[SpeedRatio]]:
+    """Measure, write times.csv, ratios.csv and provenance.json, and print both tables.
+
+    Raises:
+        ValueError: an option is out of range or names something unknown, or the policy is privileged.
+        OSError: the folder cannot be written.
+    """
     finite_number("episodes", options.episodes, at_least=1)
-    table = Table(title=f"preset {options.preset}, {options.episodes} episodes; one core unless said")
-    for column in ("work", "median", "99 %", "unit"):
-        table.add_column(column, justify="left" if column == "work" else "right")
-    for name, seconds in (measure_steps(options) | measure_plans(options)).items():
-        middle, high = 1e6 * np.quantile(seconds, (0.5, 0.99))
-        table.add_row(name, f"{middle:.0f}", f"{high:.0f}", "us")
-    for wall in measure_terrain(options.repeats):
-        table.add_row(wall.name, f"{wall.median:.3f}", f"{max(wall.seconds):.3f}", "s")
-    Console().print(table)
+    out, console = open_folder(options.out), Console(width=max(Console().width, 120))
+    measured = measure_steps(options) | measure_plans(options)
+    works = [Work(name, *np.quantile(seconds, (0.5, 0.99))) for name, seconds in measured.items()]
+    works += [Work(wall.name, wall.median, max(wall.seconds)) for wall in measure_terrain(options.repeats)]
+    ratios = measure_ratios(options.preset)
+    write_csv(out / "times.csv", COLUMNS, works)
+    write_csv(out / "ratios.csv", RATIO_COLUMNS, ratios)
+    write_provenance(out / "provenance.json", describe_run(options))
+    title = f"preset {options.preset}, {options.episodes} episodes; one core unless said"
+    console.print(console_table(COLUMNS, works, title))
+    console.print(console_table(RATIO_COLUMNS, ratios, "processor times as ratios, and the limits they keep"))
+    console.print(f"results in {out}")
+    return works, ratios
 
 
 def main() -> None:

@@ -26,10 +26,13 @@ from hda.ground.library import Ground, remove_tiles
 from hda.task.presets import PRESETS, Preset, find_preset
 from hda.task.scenario import sample_scenario
 from hda.terrain.generator import TerrainParameters
-from studies.campaign.command_line import one_line_errors
-from studies.campaign.executor import local_processes
-from studies.campaign.monte_carlo import Study, prepare_study, run_study
-from studies.campaign.rows import MEASURES
+from studies.campaign.command_line import open_folder, resumable
+from studies.campaign.monte_carlo import Study
+from studies.campaign.points import Point, fly_points
+from studies.campaign.provenance import describe_run, write_provenance
+from studies.campaign.run_options import FolderOptions
+from studies.campaign.score import MEASURE_COLUMNS, RATIO_COLUMNS, Score, score_rows
+from studies.columns import Column, Output, console_table, standing_in, write_csv, write_markdown
 from studies.ground_statistics import GroundStatistics, measure_ground
 from studies.paper import PAPER_ROWS
 
@@ -56,11 +59,11 @@ SEARCHES = {
     "hard": Search(60.0, "threshold", (-0.8, -1.0, -1.2, -1.4), digits=1),
 }
 """The search that each preset was made by."""
-GROUND_EPISODES = 600
+_POLICY = "single-divert"
 
 
-@dataclass(frozen=True)
-class Calibration:
+@dataclass(frozen=True, kw_only=True)
+class Calibration(FolderOptions):
     """Command line of the calibration.
 
     Attributes:
@@ -69,8 +72,8 @@ class Calibration:
         control_periods: [s] control periods to sweep at the value found.
         episodes: episodes for the final row.
         sweep_episodes: episodes for each point of a sweep.
-        workers: processes.
-        out: folder for the tables.
+        ground_episodes: episodes whose ground is described.
+        workers: processes; changes nothing but the time.
     """
 
     preset: str = "paper"
@@ -78,36 +81,48 @@ class Calibration:
     control_periods: Annotated[tuple[float, ...], tyro.conf.arg(metavar="S ...")] = (0.25, 0.5, 0.625, 1.0)
     episodes: int = 6000
     sweep_episodes: int = 2000
+    ground_episodes: int = 600
     workers: int = 2
     out: Path = Path("results/calibrate")
+
+    def __post_init__(self) -> None:
+        """Check every number."""
+        for name in ("episodes", "sweep_episodes", "ground_episodes", "workers"):
+            finite_number(name, getattr(self, name), at_least=1)
 
 
 @dataclass(frozen=True)
 class SingleDivertRow:
-    """Single Divert's mean measures on one setting.
+    """Single Divert on one setting.
 
     Attributes:
         label: what the setting is.
-        safe_percent: safe-landing percentage.
-        means: measure -> mean.
+        score: every figure with its intervals.
     """
 
     label: str
-    safe_percent: float
-    means: dict[str, float]
+    score: Score
 
 
-def fly_single_divert(preset: Preset, episodes: int, workers: int, label: str) -> SingleDivertRow:
-    """Fly Single Divert over the tuning tiles of a setting; its terrain is kept only if a preset uses it."""
-    study = Study(preset, ("single-divert",), episodes, split="tuning")
-    prepare_study(study, workers)
-    with local_processes(workers) as executor:
-        rows = run_study(study, executor).rows
-    return SingleDivertRow(
-        label,
-        100.0 * float(np.mean([row.safe_site for row in rows])),
-        {name: float(np.mean([getattr(row, name) for row in rows])) for name in MEASURES},
-    )
+COLUMNS: tuple[Column[SingleDivertRow], ...] = (
+    Column("setting", "setting", lambda row: row.label, words=True),
+    Column("episodes", "episodes", lambda row: row.score.episodes, outputs=Output.FILE),
+    *(column.through(lambda row: row.score) for column in (*RATIO_COLUMNS, *MEASURE_COLUMNS)),
+)
+"""The table: its file, document and console read this list."""
+
+
+def fly_single_divert(preset: Preset, episodes: int, options: Calibration, label: str) -> SingleDivertRow:
+    """Fly Single Divert over the tuning tiles of a setting, in a folder of its own below that of the options.
+
+    Raises:
+        ValueError: the folder holds another study, or a worker failed.
+        OSError: the folder cannot be written.
+    """
+    name = f"{preset.name}/{label.replace(',', '').replace(' ', '-')}-{episodes}-episodes"
+    study = Study(preset, (_POLICY,), episodes, split="tuning")
+    flown = fly_points(options.out, [Point(name, study)], options.existing, options.workers)
+    return SingleDivertRow(label, score_rows(flown[name][_POLICY]))
 
 
 def with_islands(preset: Preset, parameter: str, value: float) -> Preset:
@@ -129,7 +144,7 @@ def sweep_islands(preset: Preset, search: Search, options: Calibration) -> list[
     for value in search.values:
         setting = with_islands(preset, search.parameter, value)
         label = f"{search.parameter} {value:g}"
-        rows.append(fly_single_divert(setting, options.sweep_episodes, options.workers, label))
+        rows.append(fly_single_divert(setting, options.sweep_episodes, options, label))
         ground = Ground(setting.terrain, setting.criteria)
         if ground not in kept:
             remove_tiles(ground)
@@ -149,7 +164,7 @@ def interpolate_crossing(values: Sequence[float], safe_percent: Sequence[float],
     raise ValueError(f"values must bracket {target:g} % safe, got {list(safe_percent)} at {list(values)}")
 
 
-def describe_ground(preset: Preset, episodes: int = GROUND_EPISODES) -> dict[str, tuple[float, float, float]]:
+def describe_ground(preset: Preset, episodes: int) -> dict[str, tuple[float, float, float]]:
     """10, 50 and 90 % quantiles (and for the nearest safe ground 10, 50, 97 %) of the ground statistics."""
     ground = [measure_ground(sample_scenario(preset, 0, k, "tuning")) for k in range(episodes)]
 
@@ -163,48 +178,43 @@ def describe_ground(preset: Preset, episodes: int = GROUND_EPISODES) -> dict[str
 
 
 def write_rows(path: Path, rows: Sequence[SingleDivertRow]) -> None:
-    """Write rows as CSV, the paper's first."""
-    paper = PAPER_ROWS["Single Divert"]
-    lines = ["setting,safe_percent," + ",".join(MEASURES)]
-    lines.append(f"paper,{paper['safe_site_percent']}," + ",".join(str(paper.get(m, "")) for m in MEASURES))
-    lines += [
-        f"{r.label},{r.safe_percent:.6g}," + ",".join(f"{r.means[m]:.6g}" for m in MEASURES) for r in rows
-    ]
-    path.write_text("\n".join(lines) + "\n")
+    """Write rows as CSV, and beside it for a document."""
+    write_csv(path, COLUMNS, rows)
+    write_markdown(path.with_suffix(".md"), COLUMNS, rows)
 
 
 def print_rows(title: str, rows: Sequence[SingleDivertRow]) -> None:
-    """Print rows under the paper's."""
+    """Print rows, and the paper's below them."""
     from rich.console import Console
-    from rich.table import Table
 
-    table = Table(title=title)
-    for column in ("setting", "safe %", *MEASURES):
-        table.add_column(column, justify="left" if column == "setting" else "right")
+    table = console_table(COLUMNS, rows, title)
+    table.add_section()
     paper = PAPER_ROWS["Single Divert"]
-    cells = (f"{paper[m]:g}" if m in paper else "" for m in MEASURES)
-    table.add_row("the paper", f"{paper['safe_site_percent']:g}", *cells, end_section=True)
-    for row in rows:
-        table.add_row(row.label, f"{row.safe_percent:.2f}", *(f"{row.means[m]:.4g}" for m in MEASURES))
-    Console(width=150).print(table)
+    _, *others = standing_in(COLUMNS, Output.CONSOLE)
+    table.add_row("the paper", *(c.show(paper[c.key]) if c.key in paper else "" for c in others))
+    Console(width=max(Console().width, 150)).print(table)
 
 
 def calibrate(options: Calibration) -> SingleDivertRow:
-    """Run the calibration that the command line asks for; return the final row."""
-    finite_number("episodes", options.episodes, at_least=1)
-    finite_number("sweep_episodes", options.sweep_episodes, at_least=1)
-    finite_number("workers", options.workers, at_least=1)
+    """Run the calibration that the command line asks for; return the final row.
+
+    Raises:
+        ValueError: an option names something unknown, a sweep does not bracket its target, a folder holds
+            another study, or a worker failed.
+        OSError: the folder cannot be written.
+    """
     preset = find_preset(options.preset)
-    options.out.mkdir(parents=True, exist_ok=True)
+    open_folder(options.out)
     if options.search:
         preset = search_islands(preset, options)
     assert isinstance(preset.terrain, TerrainParameters)
     islands = preset.terrain.islands
     label = f"islands {islands.smoothing_scale:g} m, {islands.threshold:g} sigma"
-    row = fly_single_divert(preset, options.episodes, options.workers, label)
+    row = fly_single_divert(preset, options.episodes, options, label)
     print_rows(f"{preset.name}: single-divert on the tuning tiles, {options.episodes} episodes", [row])
     write_rows(options.out / f"{preset.name}.csv", [row])
-    print_ground(preset)
+    write_provenance(options.out / f"{preset.name}-provenance.json", describe_run(options))
+    print_ground(preset, options.ground_episodes)
     return row
 
 
@@ -219,28 +229,28 @@ def search_islands(preset: Preset, options: Calibration) -> Preset:
     search = SEARCHES[preset.name]
     sweep = sweep_islands(preset, search, options)
     print_rows(f"{preset.name}: islands, {options.sweep_episodes} episodes each", sweep)
-    crossing = interpolate_crossing(search.values, [row.safe_percent for row in sweep], search.target)
+    crossing = interpolate_crossing(
+        search.values, [100.0 * row.score.safe_site.estimate for row in sweep], search.target
+    )
     value = round(crossing, search.digits)
     chosen = with_islands(preset, search.parameter, value)
     periods = []
     for period in options.control_periods:
         setting = with_control_period(chosen, period)
         label = f"control period {period:g} s"
-        periods.append(fly_single_divert(setting, options.sweep_episodes, options.workers, label))
+        periods.append(fly_single_divert(setting, options.sweep_episodes, options, label))
     print_rows(f"{preset.name}: control period at {search.parameter} {value:g}", periods)
     write_rows(options.out / f"{preset.name}-sweep.csv", [*sweep, *periods])
     return chosen
 
 
-def print_ground(preset: Preset) -> None:
+def print_ground(preset: Preset, episodes: int) -> None:
     """Print how safe ground lies around the first targets."""
     from rich.console import Console
 
     console = Console(width=150)
-    console.print(
-        f"ground within {preset.start.hazard_radius:g} m of the first target, {GROUND_EPISODES} episodes:"
-    )
-    for name, values in describe_ground(preset).items():
+    console.print(f"ground within {preset.start.hazard_radius:g} m of the first target, {episodes} episodes:")
+    for name, values in describe_ground(preset, episodes).items():
         last = "97" if name == "nearest_safe" else "90"
         console.print(f"  {name}: " + ", ".join(f"{v:.3g}" for v in values) + f" (10, 50, {last} %)")
 
@@ -249,7 +259,7 @@ def main() -> None:
     """Command line; a wrong option is one line on stderr and exit code 2."""
     tolerate_encoding()
     options = tyro.cli(Calibration, description=__doc__)
-    with one_line_errors():
+    with resumable():
         calibrate(options)
 
 

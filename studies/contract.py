@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from hda.flight.episode import advance, begin_flight, fly, observe
+from hda.flight.episode import fly, fly_legs, inform_pilot
 from hda.policies.entry import AnyPolicy
-from hda.policy import Decision, Policy, PrivilegedPolicy
+from hda.policy import Decision
 from hda.task.observation import Observation
 from hda.task.presets import Preset
 from hda.task.scenario import Scenario, sample_scenario
@@ -52,27 +52,27 @@ def check_contract(make: Callable[[], AnyPolicy], preset: Preset, episodes: int 
 
 def _check_decisions(name: str, make: Callable[[], AnyPolicy], scenario: Scenario) -> None:
     where = f"policy {name!r}, look 0 of a trial episode"
+
+    def decide(observation: Observation, memory: Any) -> tuple[Decision, Any]:
+        nonlocal where
+        where = f"policy {name!r}, look {observation.index} of a trial episode"
+        before = copy.deepcopy(observation)
+        answers = [
+            _checked(asked.decide(observation, copy.deepcopy(memory)), where)
+            for asked in (pilot, pilot, other)
+        ]
+        if not equal_values(observation, before):
+            raise ContractError(f"{where}: it changed the observation")
+        for answer, cause in zip(answers[1:], ("asked again", "asked of a new object"), strict=True):
+            if not equal_values(answer[0], answers[0][0]):
+                raise ContractError(f"{where}: {cause}, it decides otherwise: it keeps state on itself")
+        return answers[0]
+
     try:
-        pilot, other = _pilot(make(), scenario), _pilot(make(), scenario)
+        pilot, other = (inform_pilot(make(), scenario) for _ in range(2))
         memory: Any = pilot.begin(scenario.view, scenario.streams.policy())
-        flight = begin_flight(scenario)
-        over = False
-        while not over:
-            where = f"policy {name!r}, look {flight.index} of a trial episode"
-            observation = observe(scenario, flight)
-            before = copy.deepcopy(observation)
-            answers = [
-                _checked(asked.decide(observation, copy.deepcopy(memory)), where)
-                for asked in (pilot, pilot, other)
-            ]
-            if not equal_values(observation, before):
-                raise ContractError(f"{where}: it changed the observation")
-            for answer, cause in zip(answers[1:], ("asked again", "asked of a new object"), strict=True):
-                if not equal_values(answer[0], answers[0][0]):
-                    raise ContractError(f"{where}: {cause}, it decides otherwise: it keeps state on itself")
-            decision, memory = answers[0]
-            step = advance(scenario, flight, decision)
-            flight, over = step.flight, step.outcome is not None
+        for _ in fly_legs(scenario, decide, memory):
+            pass
     except ContractError:
         raise
     except Exception as error:
@@ -80,10 +80,6 @@ def _check_decisions(name: str, make: Callable[[], AnyPolicy], scenario: Scenari
         raise ContractError(
             f"{where}: {type(error).__name__}: {error} ({last.filename}, line {last.lineno})"
         ) from error
-
-
-def _pilot(policy: AnyPolicy, scenario: Scenario) -> Policy[Any]:
-    return policy.informed(scenario.tile) if isinstance(policy, PrivilegedPolicy) else policy
 
 
 def _checked(answer: object, where: str) -> tuple[Decision, Any]:

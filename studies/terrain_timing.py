@@ -1,4 +1,4 @@
-"""How long a tile and its safety map take: `python -m studies.terrain_timing`."""
+"""How long a tile and its safety map take; `python -m studies.bench` prints it."""
 
 from __future__ import annotations
 
@@ -64,27 +64,3 @@ def _measure(name: str, work: Callable[[], object], repeats: int) -> WallTime:
         work()
         seconds.append(time.perf_counter() - started)
     return WallTime(name, tuple(seconds))
-
-
-def print_timings(repeats: int = 7, size: int = 1000) -> None:
-    """Print the wall time of a tile and of its safety map, median, least and greatest.
-
-    Args:
-        repeats: how often each is done after the first.
-        size: [cells] side of the tile.
-    """
-    from rich.console import Console
-
-    console = Console(highlight=False)
-    for timing in measure_terrain(repeats, size):
-        low, high = min(timing.seconds), max(timing.seconds)
-        console.print(f"{timing.name:<46} {timing.median:.3f} s ({low:.3f} to {high:.3f})")
-
-
-if __name__ == "__main__":
-    import tyro
-
-    from guidance.console import tolerate_encoding
-
-    tolerate_encoding()
-    tyro.cli(print_timings)

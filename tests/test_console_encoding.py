@@ -83,7 +83,7 @@ def test_commands_end_well_in_a_pipe_of_any_encoding(encoding, tmp_path):
     start = ["--state", "100", "0", "900", "0", "0", "-30", "1200"]
     for command, status in (
         (["studies.compare", "--help"], 0),
-        (["studies.sample_size"], 0),
+        (["studies.sample_size", "--out", str(tmp_path / "plan")], 0),
         (["rl.train", "--help"], 0),
         (["hda.terrain", "--help"], 0),
         (["guidance.pdg", *start, "--plot", str(picture)], 0),

@@ -12,7 +12,7 @@ from guidance.console import tolerate_encoding
 from guidance.descent.plan import GuidanceError, Plan
 from guidance.descent.residuals import RESIDUAL_UNITS
 from guidance.lander import Lander
-from guidance.pdg.solve import DEFAULT_NODES, solve_pdg
+from guidance.pdg.solve import DEFAULT_NODES, PlanningMethod, solve_pdg
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class PdgCommand:
     speed_limit: float | None = None
     time_of_flight: float | None = None
     nodes: int = DEFAULT_NODES
-    method: Literal["convex", "cvxpy", "casadi"] = "convex"
+    method: PlanningMethod = "convex"
     unreachable: Literal["raise", "nearest"] = "raise"
     plot: Path | None = None
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,7 +25,9 @@ DEFAULT_NODES = 61
 FEWEST_NODES = 5
 ARRIVED = "the start is the target, with its velocity: no flight is needed"
 """Said of a plan with free time of flight: the shorter it is, the better."""
-METHODS = ("convex", "casadi", "cvxpy")
+PlanningMethod = Literal["convex", "casadi", "cvxpy"]
+"""Planners that can be asked for by name."""
+METHODS: tuple[PlanningMethod, ...] = get_args(PlanningMethod)
 UNREACHABLE = ("raise", "nearest")
 
 
@@ -40,7 +42,7 @@ def solve_pdg(
     speed_limit: float | None = None,
     time_of_flight: float | None = None,
     nodes: int = DEFAULT_NODES,
-    method: Literal["convex", "casadi", "cvxpy"] = "convex",
+    method: PlanningMethod = "convex",
     unreachable: Literal["raise", "nearest"] = "raise",
     guess: Plan | None = None,
     throw: bool = True,

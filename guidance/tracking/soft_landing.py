@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,7 +23,7 @@ from guidance.constants import MOON_GRAVITY
 from guidance.descent.plan import Plan, PlanStatus
 from guidance.descent.problem import LandingProblem, lies_below
 from guidance.lander import Lander
-from guidance.pdg.solve import replan
+from guidance.pdg.solve import PlanningMethod, replan
 from guidance.state import State
 from guidance.tracking.reference import TrackingReference, make_reference, states_at
 from guidance.validation import finite_number, finite_vector
@@ -50,7 +49,7 @@ class SoftLandingOptions:
     terminal_deceleration: float = 1.5
     speed_limit: float | None = None
     nodes: int = 31
-    method: Literal["convex", "casadi", "cvxpy"] = "convex"
+    method: PlanningMethod = "convex"
     pointing_margin: float = 0.1
 
     def __post_init__(self) -> None:

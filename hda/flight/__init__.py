@@ -1,7 +1,7 @@
 """The simulator: a vehicle between two looks, an episode from look to look, and how it ended.
 
-`fly` is the one loop; the Gymnasium environments step through the same functions. It imports the task and
-the seam (`hda.policy`), no policy.
+`fly_legs` is the one loop; the Gymnasium environments step through the same functions. It imports the task
+and the seam (`hda.policy`), no policy.
 """
 
 from typing import TYPE_CHECKING
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from guidance.exports import lazy_exports
 
 if TYPE_CHECKING:
-    from hda.flight.episode import advance, begin_flight, fly, observe
+    from hda.flight.episode import advance, begin_flight, fly, fly_legs, observe
     from hda.flight.outcome import Ending, Outcome
     from hda.flight.record import EpisodeRecord
     from hda.flight.vehicle import FlightErrors, FlightStatus, Segment, fly_interval
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 _HOMES = {
     "hda.flight.episode": (
         "fly",
+        "fly_legs",
         "observe",
         "advance",
         "begin_flight",
@@ -45,6 +46,7 @@ __all__ = [
     "begin_flight",
     "fly",
     "fly_interval",
+    "fly_legs",
     "observe",
 ]
 

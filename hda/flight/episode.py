@@ -1,26 +1,28 @@
 """Flying one episode: look, decide, fly five seconds, again, until the ground.
 
-`begin_flight`, `observe` and `advance` are the steps; `fly` and the Gymnasium environment both call them.
+`begin_flight`, `observe` and `advance` are the steps. `fly_legs` takes them in turn to the end, for `fly` and
+for whoever else flies an episode; the Gymnasium environments call them one by one.
 """
 
 from __future__ import annotations
 
 import time as clock
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.state import State
 from guidance.upright_time import upright_time_to_go
-from hda.flight.outcome import Outcome, RewardTerms, classify, score_step
+from hda.flight.outcome import Contact, Outcome, RewardTerms, classify, score_step
 from hda.flight.record import EpisodeRecord
-from hda.flight.vehicle import FlightErrors, FlightStatus, Segment, fly_interval
-from hda.policy import Decision, Policy, PrivilegedPolicy
+from hda.flight.vehicle import ControlPeriods, FlightErrors, FlightStatus, Segment, fly_interval
+from hda.policy import Decision, Memory, Policy, PrivilegedPolicy
 from hda.sensing.lidar import look
 from hda.task.observation import Observation
-from hda.task.scenario import Scenario
+from hda.task.scenario import Scenario, estimated_state, ground_point
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +38,7 @@ class Flight:
 
     index: int
     state: State
-    target: NDArray[np.float64]
+    target: Array
     time_to_go: float
 
 
@@ -61,7 +63,7 @@ class Step:
     slant_angle: float
 
 
-def elevation_angle(position: NDArray[np.float64], target: NDArray[np.float64]) -> float:
+def elevation_angle(position: Array, target: Array) -> float:
     """[rad] elevation of `position` seen from `target` (both shape (3,)): 90 degrees is overhead."""
     offset = position - target
     return float(np.arctan2(offset[2], np.hypot(offset[0], offset[1])))
@@ -73,22 +75,6 @@ def begin_flight(scenario: Scenario) -> Flight:
     target = scenario.nominal_target
     clock = upright_time_to_go(estimated_state(scenario, state), target, preset.lander, preset.gravity)
     return Flight(0, state, target, clock)
-
-
-def estimated_state(scenario: Scenario, state: State) -> State:
-    """The state as the lander estimates it: the true one plus the episode's navigation error."""
-    error = scenario.navigation_error
-    return State(state.position + error[:3], state.velocity + error[3:], state.mass)
-
-
-def ground_point(scenario: Scenario, site: NDArray[np.float64]) -> NDArray[np.float64]:
-    """[m] shape (3,), where a site in the frame of the estimated position really lies on the plane.
-
-    The lander points and places its looks relative to itself, so what it takes to be at `site` is off by the
-    horizontal error of its own position.
-    """
-    error = scenario.navigation_error
-    return site - np.array([error[0], error[1], 0.0])
 
 
 def observe(scenario: Scenario, flight: Flight) -> Observation:
@@ -131,7 +117,7 @@ def advance(scenario: Scenario, flight: Flight, decision: Decision) -> Step:
         decision,
         preset.lander,
         np.array(preset.gravity),
-        (rules.control_period, rules.control_periods),
+        ControlPeriods(rules.control_period, rules.control_periods),
         FlightErrors(
             scenario.streams.thrust_error(flight.index, rules.thrust_error), scenario.navigation_error
         ),
@@ -142,14 +128,68 @@ def advance(scenario: Scenario, flight: Flight, decision: Decision) -> Step:
     initial = scenario.initial_state
     outcome = None
     if landed or truncated:
-        ground = (
-            landed,
-            landed and scenario.tile.is_safe(after.state.position),
-            segment.status is FlightStatus.TANK_EMPTY,
+        contact = Contact(
+            landed=landed,
+            safe_cell=landed and scenario.tile.is_safe(after.state.position),
+            tank_empty=segment.status is FlightStatus.TANK_EMPTY,
         )
-        outcome = classify(initial, after.state, aims[1], ground, (preset.lander, rules))
+        outcome = classify(initial, after.state, aims[1], contact, preset.lander, rules)
     burnt = (flight.state.mass - after.state.mass) / (initial.mass - preset.lander.dry_mass)
     return Step(after, segment, outcome, truncated, score_step(burnt, outcome), slant)
+
+
+@dataclass(frozen=True, eq=False)
+class Leg:
+    """One look, the decision on it, and the flight that followed.
+
+    Attributes:
+        observation: what was seen.
+        decision: what was decided.
+        step: what that led to.
+        look_time: [s] wall time of the look; the three times are not reproducible.
+        decision_time: [s] wall time of the decision.
+        flight_time: [s] wall time of the flight.
+    """
+
+    observation: Observation
+    decision: Decision
+    step: Step
+    look_time: float
+    decision_time: float
+    flight_time: float
+
+
+def fly_legs(
+    scenario: Scenario,
+    decide: Callable[[Observation, Memory], tuple[Decision, Memory]],
+    memory: Memory,
+) -> Iterator[Leg]:
+    """Look, decide, fly on, until the episode ends: one leg after another.
+
+    Args:
+        scenario: what to fly.
+        decide: gives the decision on an observation, and the memory for the next.
+        memory: before the first look.
+
+    Raises:
+        ValueError: a decision's site is not on the target plane.
+    """
+    flight, ended = begin_flight(scenario), False
+    while not ended:
+        started = clock.perf_counter()
+        observation = observe(scenario, flight)
+        looked = clock.perf_counter()
+        decision, memory = decide(observation, memory)
+        decided = clock.perf_counter()
+        step = advance(scenario, flight, decision)
+        flown = clock.perf_counter()
+        yield Leg(observation, decision, step, looked - started, decided - looked, flown - decided)
+        flight, ended = step.flight, step.outcome is not None
+
+
+def inform_pilot(policy: Policy[Any] | PrivilegedPolicy, scenario: Scenario) -> Policy[Any]:
+    """The policy itself; a privileged one as it is when told the scenario."""
+    return policy.informed(scenario) if isinstance(policy, PrivilegedPolicy) else policy
 
 
 def _check_answer(name: str, answer: object) -> tuple[Decision, Any]:
@@ -166,7 +206,7 @@ def fly(policy: Policy[Any] | PrivilegedPolicy, scenario: Scenario) -> EpisodeRe
     """Fly one episode.
 
     Args:
-        policy: any policy; a privileged one is first given the true map.
+        policy: any policy; a privileged one is first given the scenario, with its true map.
         scenario: what to fly.
 
     Returns:
@@ -176,34 +216,22 @@ def fly(policy: Policy[Any] | PrivilegedPolicy, scenario: Scenario) -> EpisodeRe
         ValueError: the policy returns something that is not (Decision, memory), or a site off the target
             plane.
     """
-    pilot = policy.informed(scenario.tile) if isinstance(policy, PrivilegedPolicy) else policy
-    memory = pilot.begin(scenario.view, scenario.streams.policy())
-    flight = begin_flight(scenario)
-    observations: list[Observation] = []
-    decisions: list[Decision] = []
-    steps: list[Step] = []
-    durations: list[float] = []
-    while not steps or steps[-1].outcome is None:
-        observation = observe(scenario, flight)
-        started = clock.perf_counter()
-        answer = pilot.decide(observation, memory)
-        durations.append(clock.perf_counter() - started)
-        decision, memory = _check_answer(policy.name, answer)
-        step = advance(scenario, flight, decision)
-        flight = step.flight
-        observations.append(observation)
-        decisions.append(decision)
-        steps.append(step)
-    outcome = steps[-1].outcome
+    pilot = inform_pilot(policy, scenario)
+
+    def decide(observation: Observation, memory: Any) -> tuple[Decision, Any]:
+        return _check_answer(policy.name, pilot.decide(observation, memory))
+
+    legs = tuple(fly_legs(scenario, decide, pilot.begin(scenario.view, scenario.streams.policy())))
+    outcome = legs[-1].step.outcome
     assert outcome is not None
     return EpisodeRecord(
         policy=policy.name,
         scenario=scenario,
-        observations=tuple(observations),
-        decisions=tuple(decisions),
-        segments=tuple(step.segment for step in steps),
-        rewards=tuple(step.reward for step in steps),
+        observations=tuple(leg.observation for leg in legs),
+        decisions=tuple(leg.decision for leg in legs),
+        segments=tuple(leg.step.segment for leg in legs),
+        rewards=tuple(leg.step.reward for leg in legs),
         outcome=outcome,
-        minimum_slant_angle=min(step.slant_angle for step in steps),
-        decision_time=np.array(durations),
+        minimum_slant_angle=min(leg.step.slant_angle for leg in legs),
+        decision_time=np.array([leg.decision_time for leg in legs]),
     )

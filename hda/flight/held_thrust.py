@@ -6,36 +6,72 @@ Kernels on arrays, for the vehicle's inner loop; a state is seven numbers (x y z
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.dynamics import propagate_into
 from guidance.kernel import compile_kernel
 
 FLYING, TOUCHDOWN, TANK_EMPTY = 0, 1, 2
 """Where a period leaves the vehicle: `hda.flight.vehicle.FlightStatus` as plain numbers."""
 
-VehicleNumbers = tuple[float, float, float, float, float]
-"""Least thrust [N], greatest thrust [N], exhaust velocity [m/s], dry mass [kg], pointing limit [rad]."""
+
+class VehicleLimits(NamedTuple):
+    """What the kernels know of a lander.
+
+    Attributes:
+        min_thrust: [N].
+        max_thrust: [N].
+        exhaust_velocity: [m/s].
+        dry_mass: [kg].
+        pointing_limit: [rad] greatest angle of the thrust from the vertical.
+    """
+
+    min_thrust: float
+    max_thrust: float
+    exhaust_velocity: float
+    dry_mass: float
+    pointing_limit: float
+
+
+class FlightConditions(NamedTuple):
+    """What stays as it is between two looks.
+
+    Attributes:
+        period: [s] over which a thrust is held.
+        plane: [m] height of the target plane.
+        gravity: [m/s^2] shape (3,), pointing down.
+        vehicle: limits of the lander.
+        thrust_error: relative error of the applied thrust.
+        navigation_error: estimated minus true position [m] and velocity [m/s], shape (6,).
+    """
+
+    period: float
+    plane: float
+    gravity: Array
+    vehicle: VehicleLimits
+    thrust_error: float
+    navigation_error: Array
 
 
 @compile_kernel
-def _fall_time(height: float, climb: float, pull: float) -> float:
-    """Time for a free fall through `height` >= 0, starting at vertical speed `climb`; pull > 0."""
-    root = math.sqrt(climb * climb + 2.0 * pull * height)
+def _fall_time(height: float, climb: float, gravity: float) -> float:
+    """Time for a free fall through `height` >= 0, starting at vertical speed `climb`; gravity > 0."""
+    root = math.sqrt(climb * climb + 2.0 * gravity * height)
     # both forms are exact; each avoids cancellation on its side
-    return (climb + root) / pull if climb >= 0.0 else 2.0 * height / (root - climb)
+    return (climb + root) / gravity if climb >= 0.0 else 2.0 * height / (root - climb)
 
 
 @compile_kernel
 def _lowest_instant(
-    start: NDArray[np.float64],
-    thrust: NDArray[np.float64],
+    start: Array,
+    thrust: Array,
     duration: float,
-    gravity: NDArray[np.float64],
+    gravity: Array,
     exhaust_velocity: float,
-    out: NDArray[np.float64],
+    out: Array,
 ) -> float:
     """When the vertical velocity, negative at the start and positive at the end, passes zero."""
     low = 0.0
@@ -52,15 +88,15 @@ def _lowest_instant(
 
 @compile_kernel
 def _hold(
-    start: NDArray[np.float64],
-    thrust: NDArray[np.float64],
+    start: Array,
+    thrust: Array,
     duration: float,
-    gravity: NDArray[np.float64],
-    exhaust_velocity: float,
-    plane: float,
-    out: NDArray[np.float64],
+    conditions: FlightConditions,
+    out: Array,
 ) -> tuple[float, bool]:
     """Hold a thrust for `duration`, or until the plane is crossed: (time flown, whether it was crossed)."""
+    gravity, plane = conditions.gravity, conditions.plane
+    exhaust_velocity = conditions.vehicle.exhaust_velocity
     propagate_into(start, thrust, duration, gravity, exhaust_velocity, out)
     high = duration
     below = out[2] <= plane
@@ -86,10 +122,10 @@ def _hold(
 
 @compile_kernel
 def fall_to_plane(
-    start: NDArray[np.float64],
-    gravity: NDArray[np.float64],
+    start: Array,
+    gravity: Array,
     plane: float,
-    out: NDArray[np.float64],
+    out: Array,
 ) -> float:
     """Fall freely to the plane; return the time it took."""
     time = _fall_time(max(0.0, start[2] - plane), start[5], -gravity[2])
@@ -99,26 +135,20 @@ def fall_to_plane(
 
 @compile_kernel
 def hold_period(
-    start: NDArray[np.float64],
-    commanded: NDArray[np.float64],
-    thrust_error: float,
-    duration: float,
-    gravity: NDArray[np.float64],
-    vehicle: VehicleNumbers,
-    plane: float,
-    out: NDArray[np.float64],
+    start: Array, commanded: Array, conditions: FlightConditions, out: Array
 ) -> tuple[float, int]:
     """Apply a command for one period, ended early by the ground or the tank: (time flown, status)."""
-    applied = commanded * (1.0 + thrust_error)
-    flow = math.sqrt(applied[0] ** 2 + applied[1] ** 2 + applied[2] ** 2) / vehicle[2]
-    burn = duration
-    dry = flow * duration >= start[6] - vehicle[3] and flow > 0.0
+    vehicle = conditions.vehicle
+    applied = commanded * (1.0 + conditions.thrust_error)
+    flow = math.sqrt(applied[0] ** 2 + applied[1] ** 2 + applied[2] ** 2) / vehicle.exhaust_velocity
+    burn = conditions.period
+    dry = flow * conditions.period >= start[6] - vehicle.dry_mass and flow > 0.0
     if dry:
-        burn = (start[6] - vehicle[3]) / flow
-    flown, crossed = _hold(start, applied, burn, gravity, vehicle[2], plane, out)
+        burn = (start[6] - vehicle.dry_mass) / flow
+    flown, crossed = _hold(start, applied, burn, conditions, out)
     if crossed:
         return flown, TOUCHDOWN
     if dry:
-        flown += fall_to_plane(out.copy(), gravity, plane, out)
+        flown += fall_to_plane(out.copy(), conditions.gravity, conditions.plane, out)
         return flown, TANK_EMPTY
     return flown, FLYING

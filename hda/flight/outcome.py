@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.lander import Lander
 from guidance.state import State
 from hda.task.rules import Rules
@@ -31,6 +31,32 @@ class Ending(StrEnum):
     """Still in flight after the last decision."""
 
 
+ENDINGS: dict[str, str] = {
+    Ending.SUCCESS: "landed softly on safe ground",
+    Ending.HARD_LANDING: "reached safe ground, but too fast to be a success",
+    Ending.UNSAFE_SITE: "touched down on hazardous ground",
+    Ending.CRASH: "hit the ground faster than the crash speed",
+    Ending.TANK_EMPTY: "ran out of propellant above the ground",
+    Ending.TIMED_OUT: "was still in flight after its last decision",
+}
+"""Each ending in words that follow the name of who flew."""
+
+
+@dataclass(frozen=True)
+class Contact:
+    """How the plane was met.
+
+    Attributes:
+        landed: the plane was crossed.
+        safe_cell: the cell there is safe.
+        tank_empty: the tank ran dry before.
+    """
+
+    landed: bool
+    safe_cell: bool
+    tank_empty: bool
+
+
 @dataclass(frozen=True, eq=False)
 class Outcome:
     """What is known at the end of an episode.
@@ -46,7 +72,7 @@ class Outcome:
     """
 
     ending: Ending
-    touchdown: NDArray[np.float64]
+    touchdown: Array
     safe_site: bool
     success: bool
     miss_distance: float
@@ -57,9 +83,10 @@ class Outcome:
 def classify(
     initial: State,
     final: State,
-    target: NDArray[np.float64],
-    ground: tuple[bool, bool, bool],
-    vehicle: tuple[Lander, Rules],
+    target: Array,
+    contact: Contact,
+    lander: Lander,
+    rules: Rules,
 ) -> Outcome:
     """Judge the end of a flight.
 
@@ -67,18 +94,17 @@ def classify(
         initial: state at t = 0.
         final: state at the crossing of the plane, or after the last decision.
         target: [m] shape (3,), the last target.
-        ground: (the plane was crossed, the cell there is safe, the tank ran dry before).
-        vehicle: the lander, and the rules that set the speed limits.
+        contact: how the plane was met.
+        lander: the vehicle.
+        rules: they set the speed limits.
     """
-    landed, safe, empty = ground
-    lander, rules = vehicle
     speed = float(np.linalg.norm(final.velocity))
     horizontal = math.hypot(final.velocity[0], final.velocity[1])
     soft = abs(final.velocity[2]) <= rules.soft_speed and horizontal <= rules.soft_speed
-    safe_site = landed and safe
-    if not landed:
+    safe_site = contact.landed and contact.safe_cell
+    if not contact.landed:
         ending = Ending.TIMED_OUT
-    elif empty:
+    elif contact.tank_empty:
         ending = Ending.TANK_EMPTY
     elif speed > rules.crash_speed:
         ending = Ending.CRASH

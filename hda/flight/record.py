@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from hda.flight.outcome import Outcome, RewardTerms
 from hda.flight.vehicle import Segment
 from hda.policy import Decision
@@ -39,42 +39,42 @@ class EpisodeRecord:
     rewards: tuple[RewardTerms, ...]
     outcome: Outcome
     minimum_slant_angle: float
-    decision_time: NDArray[np.float64]
+    decision_time: Array
 
     @property
-    def time(self) -> NDArray[np.float64]:
+    def time(self) -> Array:
         """[s] shape (n,), time of each node."""
         parts = [self.observations[k].time + s.time[:-1] for k, s in enumerate(self.segments)]
         last = self.observations[len(self.segments) - 1].time + self.segments[-1].time[-1:]
         return np.concatenate([*parts, last])
 
     @property
-    def path(self) -> NDArray[np.float64]:
+    def path(self) -> Array:
         """Shape (n, 7): position [m], velocity [m/s] and mass [kg] at each node."""
         return np.concatenate([*(s.path[:-1] for s in self.segments), self.segments[-1].path[-1:]])
 
     @property
-    def position(self) -> NDArray[np.float64]:
+    def position(self) -> Array:
         """[m] shape (n, 3)."""
         return self.path[:, :3]
 
     @property
-    def velocity(self) -> NDArray[np.float64]:
+    def velocity(self) -> Array:
         """[m/s] shape (n, 3)."""
         return self.path[:, 3:6]
 
     @property
-    def mass(self) -> NDArray[np.float64]:
+    def mass(self) -> Array:
         """[kg] shape (n,)."""
         return self.path[:, 6]
 
     @property
-    def commanded_thrust(self) -> NDArray[np.float64]:
+    def commanded_thrust(self) -> Array:
         """[N] shape (n - 1, 3), command within the vehicle's limits, held over each interval."""
         return np.concatenate([s.commanded for s in self.segments])
 
     @property
-    def thrust(self) -> NDArray[np.float64]:
+    def thrust(self) -> Array:
         """[N] shape (n - 1, 3), applied over each interval: the command with the thrust error."""
         return np.concatenate([s.commanded * (1.0 + s.thrust_error) for s in self.segments])
 

@@ -13,18 +13,27 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
-from guidance.kernel import compile_kernel
+from guidance.arrays import Array
 from guidance.lander import Lander
 from guidance.state import State
-from guidance.thrust_limits import limit_into, pointing_angle
-from guidance.zem_zev import zem_zev_into
+from guidance.thrust_limits import pointing_angle
 from hda.flight import held_thrust
-from hda.flight.held_thrust import FLYING, TOUCHDOWN, VehicleNumbers, fall_to_plane, hold_period
+from hda.flight.interval import enter_plan, enter_zem_zev
 from hda.policy import Decision, ZemZevCommand
 
-_Log = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]  # time, path, commanded thrust
+
+@dataclass(frozen=True)
+class ControlPeriods:
+    """Control periods between two looks.
+
+    Attributes:
+        period: [s] over which a thrust is held.
+        count: how many.
+    """
+
+    period: float
+    count: int
 
 
 class FlightStatus(IntEnum):
@@ -48,10 +57,7 @@ class FlightErrors:
     """
 
     thrust: float = 0.0
-    navigation: NDArray[np.float64] = field(default_factory=lambda: np.zeros(6))
-
-
-_LEAST_TELLING = 0.05  # [m/s^2] commanded acceleration under which the engine's error is not estimated
+    navigation: Array = field(default_factory=lambda: np.zeros(6))
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,9 +74,9 @@ class Segment:
         pointing_limited: control periods in which the pointing limit changed the thrust.
     """
 
-    time: NDArray[np.float64]
-    path: NDArray[np.float64]
-    commanded: NDArray[np.float64]
+    time: Array
+    path: Array
+    commanded: Array
     time_to_go: float
     thrust_error: float
     status: FlightStatus
@@ -82,129 +88,12 @@ class Segment:
         return State(self.path[-1, :3], self.path[-1, 3:6], float(self.path[-1, 6]))
 
 
-@compile_kernel
-def _fly_zem_zev(
-    start: NDArray[np.float64],
-    site: NDArray[np.float64],
-    gains: tuple[float, float],
-    clock: tuple[float, float, float],
-    errors: tuple[float, NDArray[np.float64]],
-    gravity: NDArray[np.float64],
-    vehicle: VehicleNumbers,
-    log: _Log,
-) -> tuple[int, int, int]:
-    """Fly one interval; `clock` = (time to go, its rate, control period).
-
-    Returns (nodes written, status, control periods in which the pointing limit acted).
-    """
-    time, path, commanded = log
-    time_to_go, rate, period = clock
-    thrust_error, navigation = errors
-    seen = start.copy()
-    limited = 0
-    periods = commanded.shape[0] - 1
-    path[0] = start
-    time[0] = 0.0
-    for k in range(periods + 1):
-        remaining = time_to_go - rate * period * k
-        if remaining <= 0.5 * period:
-            commanded[k] = 0.0
-            time[k + 1] = time[k] + fall_to_plane(path[k], gravity, site[2], path[k + 1])
-            return k + 2, TOUCHDOWN, limited
-        if k == periods:
-            break
-        seen[:6] = path[k, :6] + navigation
-        zem_zev_into(seen, site, gains, remaining, gravity, commanded[k])
-        commanded[k] *= path[k, 6]
-        if limit_into(commanded[k], vehicle[0], vehicle[1], vehicle[4]):
-            limited += 1
-        flown, status = hold_period(
-            path[k], commanded[k], thrust_error, period, gravity, vehicle, site[2], path[k + 1]
-        )
-        time[k + 1] = time[k] + flown
-        if status != FLYING:
-            return k + 2, status, limited
-    return periods + 1, FLYING, limited
-
-
-@compile_kernel
-def _fly_plan(
-    start: NDArray[np.float64],
-    reference: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
-    gains: tuple[float, float],
-    timing: tuple[float, float],
-    errors: tuple[float, NDArray[np.float64]],
-    gravity: NDArray[np.float64],
-    vehicle: VehicleNumbers,
-    log: _Log,
-) -> tuple[int, int, int]:
-    """Track a reference for one interval; `timing` = (control period, plane). Returns as `_fly_zem_zev`.
-
-    The engine's error ratio is unknown at the start of the interval; once a period has been flown it is known
-    from the change of velocity, which is compared with what the command should have given.
-    """
-    time, path, commanded = log
-    position, velocity, feedforward = reference
-    period, plane = timing
-    thrust_error, navigation = errors
-    periods = commanded.shape[0] - 1
-    left = feedforward.shape[0]
-    estimate = 0.0
-    limited = 0
-    path[0] = start
-    time[0] = 0.0
-    for k in range(periods + 1):
-        if k >= left:
-            commanded[k] = 0.0
-            time[k + 1] = time[k] + fall_to_plane(path[k], gravity, plane, path[k + 1])
-            return k + 2, TOUCHDOWN, limited
-        if k == periods:
-            break
-        for axis in range(3):
-            push = feedforward[k, axis]
-            push -= gains[0] * (path[k, axis] + navigation[axis] - position[k, axis])
-            push -= gains[1] * (path[k, 3 + axis] + navigation[3 + axis] - velocity[k, axis])
-            commanded[k, axis] = path[k, 6] * push / (1.0 + estimate)
-        if limit_into(commanded[k], vehicle[0], vehicle[1], vehicle[4]):
-            limited += 1
-        flown, status = hold_period(
-            path[k], commanded[k], thrust_error, period, gravity, vehicle, plane, path[k + 1]
-        )
-        time[k + 1] = time[k] + flown
-        if status != FLYING:
-            return k + 2, status, limited
-        estimate = _estimate_error(path[k], path[k + 1], commanded[k], period, gravity, estimate)
-    return periods + 1, FLYING, limited
-
-
-@compile_kernel
-def _estimate_error(
-    before: NDArray[np.float64],
-    after: NDArray[np.float64],
-    commanded: NDArray[np.float64],
-    period: float,
-    gravity: NDArray[np.float64],
-    estimate: float,
-) -> float:
-    """Engine's error ratio from one period's change of velocity; the old estimate where it hardly burnt."""
-    square = 0.0
-    along = 0.0
-    for axis in range(3):
-        gained = (after[3 + axis] - before[3 + axis]) / period - gravity[axis]
-        square += commanded[axis] * commanded[axis]
-        along += commanded[axis] * gained
-    mean_mass = 0.5 * (before[6] + after[6])
-    if square < (_LEAST_TELLING * mean_mass) ** 2:
-        return estimate
-    return along * mean_mass / square - 1.0
-
-
 def fly_interval(
     state: State,
     decision: Decision,
     lander: Lander,
-    gravity: NDArray[np.float64],
-    interval: tuple[float, int],
+    gravity: Array,
+    interval: ControlPeriods,
     errors: FlightErrors,
 ) -> Segment:
     """Fly a decision until the next look or the ground.
@@ -214,7 +103,7 @@ def fly_interval(
         decision: site and command.
         lander: the vehicle, which limits the thrust.
         gravity: [m/s^2] shape (3,), pointing down.
-        interval: (control period [s], control periods to the next look).
+        interval: control periods to the next look.
         errors: of the applied thrust and of the estimated state over this interval.
 
     Returns:
@@ -223,7 +112,7 @@ def fly_interval(
     Raises:
         ValueError: a plan was sampled at another control period than the vehicle's.
     """
-    period, periods = interval
+    periods = interval.count
     time, path, commanded = np.empty(periods + 2), np.empty((periods + 2, 7)), np.empty((periods + 1, 3))
     vehicle = (
         lander.min_thrust,
@@ -232,27 +121,25 @@ def fly_interval(
         lander.dry_mass,
         pointing_angle(lander),
     )
+    plane = float(decision.site[2])
+    conditions = (interval.period, plane, gravity, vehicle, errors.thrust, errors.navigation)
     start, log, command = state.as_array(), (time, path, commanded), decision.command
-    drawn = (errors.thrust, errors.navigation)
     if isinstance(command, ZemZevCommand):
-        gains = (command.position_gain, command.velocity_gain)
-        clock = (command.time_to_go, command.time_to_go_rate, period)
-        nodes, status, limited = _fly_zem_zev(
-            start, decision.site, gains, clock, drawn, gravity, vehicle, log
-        )
-        left = command.time_to_go - command.time_to_go_rate * float(time[nodes - 1])
+        rate = command.time_to_go_rate
+        asked = (command.position_gain, command.velocity_gain, command.time_to_go, rate)
+        nodes, status, limited = enter_zem_zev(start, decision.site, asked, conditions, log)
+        time_to_go = command.time_to_go - rate * float(time[nodes - 1])
     else:
         reference = command.reference
-        _check_period(reference.control_period, period)
+        _check_period(reference.control_period, interval.period)
         parts = (reference.position, reference.velocity, reference.thrust_acceleration)
-        timing = (period, float(decision.site[2]))
-        nodes, status, limited = _fly_plan(start, parts, command.gains, timing, drawn, gravity, vehicle, log)
-        left = reference.duration - float(time[nodes - 1])
+        nodes, status, limited = enter_plan(start, parts, command.gains, conditions, log)
+        time_to_go = reference.duration - float(time[nodes - 1])
     return Segment(
         time=time[:nodes],
         path=path[:nodes],
         commanded=commanded[: nodes - 1],
-        time_to_go=left,
+        time_to_go=time_to_go,
         thrust_error=errors.thrust,
         status=FlightStatus(status),
         pointing_limited=limited,

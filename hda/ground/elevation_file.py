@@ -11,8 +11,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.validation import finite_number
 from hda.ground.elevation_source import ElevationFile, ElevationFileError, known_heights
 from hda.ground.geotiff import open_geotiff
@@ -92,7 +92,7 @@ def _open_npy(path: Path, side: float, nodata: tuple[float, ...]) -> ElevationFi
             f"{path}: must hold heights in two dimensions, got {heights.dtype} of shape {heights.shape}"
         )
 
-    def read(first_row: int, last_row: int, first_column: int, last_column: int) -> NDArray[np.float64]:
+    def read(first_row: int, last_row: int, first_column: int, last_column: int) -> Array:
         return known_heights(heights[first_row:last_row, first_column:last_column], nodata)
 
     return ElevationFile((heights.shape[0], heights.shape[1]), (side, side), read, kind=heights.dtype)

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from guidance.arrays import Array
+
 HIGHEST = 1e9
 """[m] A number beyond it is no height on any body."""
 
@@ -35,7 +37,7 @@ class ElevationFile:
 
     shape: tuple[int, int]
     pixel_size: tuple[float, float]
-    read: Callable[[int, int, int, int], NDArray[np.float64]]
+    read: Callable[[int, int, int, int], Array]
     map_scale: tuple[float, float] = (1.0, 1.0)
     kind: np.dtype[Any] = np.dtype(np.float64)  # noqa: RUF009 (immutable)
     scale: float = 1.0
@@ -49,7 +51,7 @@ class ElevationFile:
 
 def known_heights(
     stored: NDArray[Any], nodata: tuple[float, ...], scale: float = 1.0, offset: float = 0.0
-) -> NDArray[np.float64]:
+) -> Array:
     """Heights [m] from stored numbers; NaN where they are not finite or one of `nodata`.
 
     A number of the file matches one of `nodata` to seven digits; beyond 1e9, where only ends of a type lie,

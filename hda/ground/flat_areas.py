@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.kernel import compile_kernel
 
 REACH = 6
@@ -35,7 +36,7 @@ class FlatAreas:
         high_steps: those of them that are higher or lower by more than any ground.
     """
 
-    height: NDArray[np.float64]
+    height: Array
     pixels: NDArray[Any]
     sides: NDArray[Any]
     cliffs: NDArray[Any]
@@ -44,7 +45,7 @@ class FlatAreas:
 
 
 def find_flat_areas(
-    heights: NDArray[np.float64], core: tuple[int, int, int, int], least_climb: float, high_step: float
+    heights: Array, core: tuple[int, int, int, int], least_climb: float, high_step: float
 ) -> FlatAreas:
     """Areas of one exact height that touch the core of a block.
 
@@ -66,7 +67,7 @@ def _root(parents: NDArray[np.int32], place: int) -> int:
 
 
 @compile_kernel
-def _connect(heights: NDArray[np.float64]) -> NDArray[np.int32]:
+def _connect(heights: Array) -> NDArray[np.int32]:
     """Union-find over neighbours of equal height: the parent of each pixel, in row-major order."""
     rows, columns = heights.shape
     parents = np.arange(rows * columns).astype(np.int32)
@@ -81,9 +82,7 @@ def _connect(heights: NDArray[np.float64]) -> NDArray[np.int32]:
 
 
 @compile_kernel
-def _follow(
-    heights: NDArray[np.float64], row: int, column: int, down: int, right: int
-) -> tuple[float, float]:
+def _follow(heights: Array, row: int, column: int, down: int, right: int) -> tuple[float, float]:
     """Climb over the first pixels beyond (row, column), and over the next; NaN where there are none."""
     rows, columns = heights.shape
     height = heights[row, column]
@@ -107,7 +106,7 @@ def _follow(
 
 @compile_kernel
 def _measure_areas(
-    heights: NDArray[np.float64],
+    heights: Array,
     first_row: int,
     last_row: int,
     first_column: int,
@@ -115,7 +114,7 @@ def _measure_areas(
     least_climb: float,
     high_step: float,
 ) -> tuple[
-    NDArray[np.float64],
+    Array,
     NDArray[np.int64],
     NDArray[np.int64],
     NDArray[np.int64],

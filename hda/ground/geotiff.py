@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from hda.ground.elevation_source import ElevationFile, ElevationFileError, known_heights
 from hda.ground.map_scale import (
     GREATEST,
@@ -70,7 +70,7 @@ def open_geotiff(path: Path, band: int | None, nodata: tuple[float, ...]) -> Ite
             k for k, color in enumerate(dataset.colorinterp, 1) if color.name == "alpha" and k != chosen
         ]
 
-        def read(first_row: int, last_row: int, first_column: int, last_column: int) -> NDArray[np.float64]:
+        def read(first_row: int, last_row: int, first_column: int, last_column: int) -> Array:
             top = rows - last_row if north_up else first_row
             window = Window(first_column, top, last_column - first_column, last_row - first_row)  # pyright: ignore[reportCallIssue]
             try:

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from guidance.arrays import Array
 
 UNCORRECTED = 1e-3
 """A file whose scale deviates by no more is taken as it is: its pixels are not resampled for that."""
@@ -48,7 +49,7 @@ class Ellipsoid:
             return f"+R={self.equatorial:.12g}"
         return f"+a={self.equatorial:.12g} +b={self.polar:.12g}"
 
-    def place(self, longitude: NDArray[np.float64], latitude: NDArray[np.float64]) -> NDArray[np.float64]:
+    def place(self, longitude: Array, latitude: Array) -> Array:
         """Cartesian places [m], shape (..., 3), of angles [deg] of shape (...)."""
         east, north = np.radians(longitude), np.radians(latitude)
         squeezed = (self.polar / self.equatorial) ** 2
@@ -96,7 +97,7 @@ class MapFrame:
     row_step: tuple[float, float]
     shape: tuple[int, int]
 
-    def coordinates(self, row: NDArray[np.float64], column: NDArray[np.float64]) -> NDArray[np.float64]:
+    def coordinates(self, row: Array, column: Array) -> Array:
         """The x and y, shape (2, ...), of places counted in pixels."""
         return np.stack(
             [
@@ -105,7 +106,7 @@ class MapFrame:
             ]
         )
 
-    def longitude_latitude(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
+    def longitude_latitude(self, places: Array) -> Array:
         """Angles [deg], shape (2, ...), of coordinates of that shape.
 
         Raises:
@@ -124,7 +125,7 @@ class MapFrame:
             raise UnknownScaleError("it reaches beyond what its coordinate system can show")
         return found.reshape(places.shape)
 
-    def pixel_metric(self, row: NDArray[np.float64], column: NDArray[np.float64]) -> NDArray[np.float64]:
+    def pixel_metric(self, row: Array, column: Array) -> Array:
         """True squared lengths and product [m^2] of a pixel's sides at some places, shape (n, 2, 2).
 
         The first axis is along a row, the second across rows.
@@ -138,7 +139,7 @@ class MapFrame:
             raise UnknownScaleError("its pixels are too small or too large for their coordinates")
         return metric
 
-    def _metric(self, row: NDArray[np.float64], column: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _metric(self, row: Array, column: Array) -> Array:
         sides = []
         for step, (down, right) in ((self.column_step, (0.0, 1.0)), (self.row_step, (1.0, 0.0))):
             pixels = max(1.0, _STEP / (math.hypot(*step) * self.unit)) / 2.0
@@ -153,7 +154,7 @@ class MapFrame:
             sides.append((ends[0] - ends[1]) / (2.0 * pixels))
         return np.array([[np.sum(a * b, axis=-1) for b in sides] for a in sides]).transpose(2, 0, 1)
 
-    def middle(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def middle(self) -> tuple[Array, Array]:
         """Row and column of the middle of the file, shape (1,)."""
         return np.array([self.shape[0] / 2.0]), np.array([self.shape[1] / 2.0])
 
@@ -205,6 +206,6 @@ def measure_scale(frame: MapFrame) -> MapScale:
     )
 
 
-def _deviation(metric: NDArray[np.float64]) -> float:
+def _deviation(metric: Array) -> float:
     """Greatest difference from 1 of the scale in any direction."""
     return float(np.abs(np.sqrt(np.linalg.eigvalsh(metric)) - 1.0).max())

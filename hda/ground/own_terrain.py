@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from hda.ground.elevation_file import ElevationFile, NoData, no_data_values, open_elevation
 from hda.ground.map_scale import GREATEST
 from hda.ground.resampling import axis_weights, resample
@@ -146,7 +146,7 @@ def open_own_terrain(
     )
 
 
-def cut_tile(terrain: OwnTerrain, number: int) -> NDArray[np.float64]:
+def cut_tile(terrain: OwnTerrain, number: int) -> Array:
     """Heights of one tile [m], shape (1000, 1000), row 0 south, NaN where unknown.
 
     Raises:

@@ -16,6 +16,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from guidance.arrays import Array
+
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
@@ -58,26 +60,26 @@ def axis_weights(first_cell: int, cells: int, pixel_size: float, pixels: int) ->
 
 def _average_pairs(
     first_cell: int, cells: int, pixel_size: float, pixels: int
-) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float64]]:
+) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
     """Each pixel counts with the share of the cell that it covers."""
-    reach = math.ceil(1.0 / pixel_size) + 1
+    across = math.ceil(1.0 / pixel_size) + 1
     west = first_cell + np.arange(cells, dtype=np.float64)[:, None]
-    pixel = np.floor(west / pixel_size).astype(np.intp) + np.arange(reach)
+    pixel = np.floor(west / pixel_size).astype(np.intp) + np.arange(across)
     begin, end = np.maximum(pixel * pixel_size, west), np.minimum((pixel + 1) * pixel_size, west + 1.0)
-    share = np.clip(end - begin, 0.0, None)
-    share[(share < 1e-9) | (pixel >= pixels)] = 0.0  # rounding at the edges of pixels
-    share /= share.sum(axis=1, keepdims=True)
+    weight = np.clip(end - begin, 0.0, None)
+    weight[(weight < 1e-9) | (pixel >= pixels)] = 0.0  # rounding at the edges of pixels
+    weight /= weight.sum(axis=1, keepdims=True)
     cell = np.broadcast_to(np.arange(cells)[:, None], pixel.shape)
-    return cell.ravel(), np.minimum(pixel, pixels - 1).ravel(), share.ravel()
+    return cell.ravel(), np.minimum(pixel, pixels - 1).ravel(), weight.ravel()
 
 
 def _cubic_pairs(
     first_cell: int, cells: int, pixel_size: float, pixels: int
-) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float64]]:
+) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
     """Keys' kernel over the four nearest pixels; a pixel beyond the edge is the mirror 2 edge - inner."""
     place = (first_cell + np.arange(cells) + 0.5) / pixel_size - 0.5
-    left = np.floor(place).astype(np.intp)
-    pixel = left[:, None] + np.arange(-1, 3)
+    nearest = np.floor(place).astype(np.intp)
+    pixel = nearest[:, None] + np.arange(-1, 3)
     weight = _keys(np.abs(place[:, None] - pixel))
     cell = np.broadcast_to(np.arange(cells)[:, None], pixel.shape).ravel()
     pixel, weight = pixel.ravel(), weight.ravel()
@@ -90,13 +92,13 @@ def _cubic_pairs(
     )
 
 
-def _keys(distance: NDArray[np.float64]) -> NDArray[np.float64]:
+def _keys(distance: Array) -> Array:
     near = (1.5 * distance - 2.5) * distance**2 + 1.0
     far = ((-0.5 * distance + 2.5) * distance - 4.0) * distance + 2.0
     return np.where(distance < 1.0, near, np.where(distance < 2.0, far, 0.0))
 
 
-def resample(heights: NDArray[np.float64], north: AxisWeights, east: AxisWeights) -> NDArray[np.float64]:
+def resample(heights: Array, north: AxisWeights, east: AxisWeights) -> Array:
     """Heights of the cells from those of the pixels that `north` and `east` ask for.
 
     Args:
@@ -114,5 +116,5 @@ def resample(heights: NDArray[np.float64], north: AxisWeights, east: AxisWeights
     return cells
 
 
-def _both_axes(values: NDArray[np.float64], north: csr_array, east: csr_array) -> NDArray[np.float64]:
+def _both_axes(values: Array, north: csr_array, east: csr_array) -> Array:
     return (east @ (north @ values).T).T

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from hda.ground.elevation_source import HIGHEST, ElevationFile
 from hda.ground.flat_areas import REACH, FlatAreas, find_flat_areas
 
@@ -54,7 +55,7 @@ class TileSurvey:
     examined: int = 0
     looked: int = 0
     areas: list[FlatAreas] = field(default_factory=list)
-    levels: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+    levels: Array = field(default_factory=lambda: np.empty(0))
 
 
 def survey_tile(
@@ -83,7 +84,7 @@ def survey_tile(
 
 
 def _survey_heights(
-    survey: TileSurvey, source: ElevationFile, block: NDArray[np.float64], core: tuple[int, int, int, int]
+    survey: TileSurvey, source: ElevationFile, block: Array, core: tuple[int, int, int, int]
 ) -> None:
     inner = block[core[0] : core[1], core[2] : core[3]]
     survey.lowest = min(survey.lowest, float(np.nanmin(inner)))
@@ -100,9 +101,7 @@ def _survey_heights(
     survey.areas.append(FlatAreas(*(getattr(areas, entry.name)[kept] for entry in fields(areas))))
 
 
-def _collapse(
-    block: NDArray[np.float64], core: tuple[int, int, int, int]
-) -> tuple[NDArray[np.float64], tuple[int, int, int, int]]:
+def _collapse(block: Array, core: tuple[int, int, int, int]) -> tuple[Array, tuple[int, int, int, int]]:
     """The same ground with each pixel once, where a file was made of larger pixels by repeating them."""
     kept = [_first_of_each(block, axis) for axis in (0, 1)]
     if min(np.count_nonzero(~first) for first in kept) == 0:
@@ -114,7 +113,7 @@ def _collapse(
     return thin, (first_row, last_row, first_column, last_column)
 
 
-def _first_of_each(block: NDArray[np.float64], axis: int) -> NDArray[np.bool_]:
+def _first_of_each(block: Array, axis: int) -> NDArray[np.bool_]:
     """Which rows (columns) differ from the one before, as far as the same number of them always follows."""
     ahead = np.moveaxis(block, axis, 0)
     same = (ahead[1:] == ahead[:-1]) | (np.isnan(ahead[1:]) & np.isnan(ahead[:-1]))
@@ -126,17 +125,17 @@ def _first_of_each(block: NDArray[np.float64], axis: int) -> NDArray[np.bool_]:
 
 def _read_strips(
     source: ElevationFile, rows: tuple[int, int], columns: tuple[int, int]
-) -> Iterator[tuple[NDArray[np.float64], tuple[int, int, int, int]]]:
+) -> Iterator[tuple[Array, tuple[int, int, int, int]]]:
     """Blocks with the ground around them, and where in them the strip lies."""
     width = columns[1] - columns[0]
     step = max(_STRIP_ROWS, round(_STRIP / source.pixel_size[0]))
     step = max(1, min(step, _STRIP_PIXELS // width))
-    left, right = max(0, columns[0] - _AROUND), min(source.shape[1], columns[1] + _AROUND)
+    west, east = max(0, columns[0] - _AROUND), min(source.shape[1], columns[1] + _AROUND)
     for first in range(rows[0], rows[1], step):
         last = min(first + step, rows[1])
-        bottom, top = max(0, first - _AROUND), min(source.shape[0], last + _AROUND)
-        block = source.read(bottom, top, left, right)
-        core = (first - bottom, last - bottom, columns[0] - left, columns[1] - left)
+        south, north = max(0, first - _AROUND), min(source.shape[0], last + _AROUND)
+        block = source.read(south, north, west, east)
+        core = (first - south, last - south, columns[0] - west, columns[1] - west)
         yield np.ascontiguousarray(block), core
 
 
@@ -151,8 +150,8 @@ def _marker_heights(source: ElevationFile) -> list[float]:
 
 def _take_out(
     found: Counter[float],
-    block: NDArray[np.float64],
-    inner: NDArray[np.float64],
+    block: Array,
+    inner: Array,
     taken: NDArray[np.bool_],
     core: tuple[int, int, int, int],
 ) -> None:
@@ -163,7 +162,7 @@ def _take_out(
     block[taken] = np.nan
 
 
-def _height_step(block: NDArray[np.float64]) -> float:
+def _height_step(block: Array) -> float:
     """[m] The step in which heights are stored; of continuous ground a small one."""
     thin = block[:: max(1, block.shape[0] // 32)]
     steps = np.abs(np.diff(thin, axis=1))

@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from guidance.arrays import Array
 from guidance.kernel import compile_kernel
 from hda.safety.criteria import SafetyCriteria
 from hda.safety.safety_map import assess_safety, elevation_array
@@ -39,7 +40,7 @@ class Tile:
                 raise ValueError(f"{name} must have shape {self.elevation.shape}, got {layer.shape}")
             layer.flags.writeable = False
 
-    def is_safe(self, position: NDArray[np.float64]) -> bool:
+    def is_safe(self, position: Array) -> bool:
         """Whether the cell under `position` [m] is safe; outside the map nothing is."""
         if not np.isfinite(position[:2]).all():
             return False
@@ -47,7 +48,7 @@ class Tile:
         rows, columns = self.deterministic.shape
         return bool(0 <= row < rows and 0 <= column < columns and self.deterministic[row, column])
 
-    def hazard_share(self, center: NDArray[np.float64], radius: float) -> float:
+    def hazard_share(self, center: Array, radius: float) -> float:
         """Share of the cells whose centres lie within `radius` [m] of `center` that are unsafe."""
         return _hazard_share(self.deterministic, float(center[0]), float(center[1]), radius)
 

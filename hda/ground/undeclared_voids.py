@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from hda.ground.elevation_source import ElevationFile, ElevationFileError
 from hda.ground.flat_areas import FlatAreas
 from hda.ground.survey import LEAST_AREA, TileSurvey, high_step
@@ -228,7 +229,7 @@ def _find_spikes(survey: TileSurvey) -> Counter[float]:
     return found
 
 
-def _count(heights: NDArray[np.float64], pixels: NDArray[Any]) -> Counter[float]:
+def _count(heights: Array, pixels: NDArray[Any]) -> Counter[float]:
     found: Counter[float] = Counter()
     for height, count in zip(heights.tolist(), pixels.tolist(), strict=True):
         found[height] += int(count)

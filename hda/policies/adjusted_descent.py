@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.tracking.reference import TrackingReference
 from guidance.tracking.regulator import tracking_gains
 from guidance.tracking.retarget import shift_landing_point, velocity_change, within_pointing, within_thrust
@@ -37,25 +37,24 @@ class AdjustedDescent:
         return self.planned.begin(view)
 
     def command(
-        self, observation: Observation, site: NDArray[np.float64], memory: DescentMemory
+        self, observation: Observation, site: Array, memory: DescentMemory
     ) -> tuple[Command, DecisionStatus, DescentMemory]:
         """Shift the plan in flight, replan, or fly on."""
-        left, view = memory.reference, memory.view
-        if left is None or memory.site is None or np.array_equal(site, memory.site):
+        remaining, view = memory.reference, memory.view
+        if remaining is None or memory.site is None or np.array_equal(site, memory.site):
             return self.planned.command(observation, site, memory)
-        shifted = shift_landing_point(left, site, view.gravity)
+        shifted = shift_landing_point(remaining, site, view.gravity)
         possible = within_thrust(shifted, view.lander, observation.state.mass, self.reserve)
         possible = possible and within_pointing(shifted, view.lander, self.reserve)
-        if not possible or left.duration > self.adjust_time:
+        if not possible or remaining.duration > self.adjust_time:
             fresh = self.planned.command(observation, site, memory)
             if not possible or _is_cheaper(fresh[:2], shifted):
                 return fresh
-        periods = round(view.decision_interval / view.control_period)
         command = PlanCommand(shifted, tracking_gains(view.control_period, self.planned.weights))
         return (
             command,
             DecisionStatus.NOMINAL,
-            replace(memory, site=site.copy(), reference=shifted.after(periods)),
+            replace(memory, site=site.copy(), reference=shifted.after(view.control_periods)),
         )
 
 

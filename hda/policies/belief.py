@@ -13,10 +13,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.kernel import compile_kernel
 from hda.sensing.lidar import Lidar
 from hda.task.observation import Observation
@@ -46,7 +48,7 @@ class SafetyBelief:
     looks: NDArray[np.uint16] = field(repr=False)
 
     @classmethod
-    def blank(cls, center: NDArray[np.float64], half_side: int) -> SafetyBelief:
+    def blank(cls, center: Array, half_side: int) -> SafetyBelief:
         """Nothing seen yet, over the cells within `half_side` [m] of `center` along each axis."""
         side = 2 * half_side
         corner = (math.floor(center[0]) - half_side, math.floor(center[1]) - half_side)
@@ -66,9 +68,11 @@ class SafetyBelief:
         target = observation.target
         _fuse_into(
             observation.safety_map,
-            (float(target[0]) - self.corner[0], float(target[1]) - self.corner[1], observation.width),
+            _LookSquare(
+                float(target[0]) - self.corner[0], float(target[1]) - self.corner[1], observation.width
+            ),
             observation.state.position - np.array([self.corner[0], self.corner[1], target[2]]),
-            (lidar.noise / lidar.noise_range, math.tan(lidar.off_nadir_limit)),
+            _SensorNumbers(lidar.noise / lidar.noise_range, math.tan(lidar.off_nadir_limit)),
             LEVELS,
             log_likelihood,
             looks,
@@ -82,13 +86,13 @@ class SafetyBelief:
         _posterior_into(self.log_likelihood, self.looks, np.log(LEVEL_SHARES), out)
         return out
 
-    def cell(self, site: NDArray[np.float64]) -> tuple[int, int] | None:
+    def cell(self, site: Array) -> tuple[int, int] | None:
         """(row, column) of the cell under `site`, or None outside the square."""
         row, column = math.floor(site[1]) - self.corner[1], math.floor(site[0]) - self.corner[0]
         n = self.looks.shape[0]
         return (row, column) if 0 <= row < n and 0 <= column < n else None
 
-    def site(self, row: int, column: int, plane: float) -> NDArray[np.float64]:
+    def site(self, row: int, column: int, plane: float) -> Array:
         """[m] shape (3,), centre of a cell at the height of the target plane."""
         return np.array([self.corner[0] + column + 0.5, self.corner[1] + row + 0.5, plane])
 
@@ -104,23 +108,37 @@ def log_reading(value: float, level: float, deviation: float) -> float:
     return -0.5 * score * score - math.log(deviation * math.sqrt(2.0 * math.pi))
 
 
+class _LookSquare(NamedTuple):
+    """[m] centre of a look, from the corner of the belief's square, and its width."""
+
+    east: float
+    north: float
+    width: float
+
+
+class _SensorNumbers(NamedTuple):
+    """Deviation of a reading over its range [1/m], and the tangent of the off-nadir limit."""
+
+    noise_per_metre: float
+    off_nadir_slope: float
+
+
 @compile_kernel
 def _fuse_into(
     safety_map: NDArray[np.float32],
-    look: tuple[float, float, float],
-    position: NDArray[np.float64],
-    sensor: tuple[float, float],
-    levels: NDArray[np.float64],
+    look: _LookSquare,
+    position: Array,
+    sensor: _SensorNumbers,
+    levels: Array,
     log_likelihood: NDArray[np.float32],
     looks: NDArray[np.uint16],
 ) -> None:
-    """Add one look; `look` is (target x, target y, width), lengths from the square's corner."""
+    """Add one look; lengths from the corner of the belief's square."""
     target_x, target_y, width = look
-    noise_per_metre, limit = sensor
     side = looks.shape[0]
     n = safety_map.shape[0]
     height = position[2]
-    reach_squared = (limit * height) ** 2 * (1.0 - 1e-9)
+    seen_squared = (sensor.off_nadir_slope * height) ** 2 * (1.0 - 1e-9)
     for i in range(n):
         y = target_y + ((i + 0.5) / n - 0.5) * width
         row = math.floor(y)
@@ -128,9 +146,9 @@ def _fuse_into(
             x = target_x + ((j + 0.5) / n - 0.5) * width
             column = math.floor(x)
             across = (x - position[0]) ** 2 + (y - position[1]) ** 2
-            if across > reach_squared or not (0 <= row < side and 0 <= column < side):
+            if across > seen_squared or not (0 <= row < side and 0 <= column < side):
                 continue
-            deviation = max(noise_per_metre * math.sqrt(across + height * height), _LEAST_DEVIATION)
+            deviation = max(sensor.noise_per_metre * math.sqrt(across + height * height), _LEAST_DEVIATION)
             looks[row, column] += 1
             for k in range(levels.size):
                 log_likelihood[k, row, column] += log_reading(safety_map[i, j], levels[k], deviation)
@@ -140,7 +158,7 @@ def _fuse_into(
 def _posterior_into(
     log_likelihood: NDArray[np.float32],
     looks: NDArray[np.uint16],
-    log_prior: NDArray[np.float64],
+    log_prior: Array,
     out: NDArray[np.float32],
 ) -> None:
     """Share of the posterior on the upper half of the levels, for the cells that were seen."""

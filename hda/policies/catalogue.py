@@ -33,7 +33,7 @@ ENTRIES: tuple[PolicyEntry, ...] = (
     ),
     PolicyEntry(
         "oracle",
-        lambda: PrivilegedComposition("oracle", OracleSite, FixedGainZemZev()),
+        lambda: PrivilegedComposition("oracle", OracleSite.informed, FixedGainZemZev()),
         "knows the true map: the nearest truly safe ground with 2 m of clearance",
         privileged=True,
     ),
@@ -57,7 +57,7 @@ ENTRIES: tuple[PolicyEntry, ...] = (
     ),
     PolicyEntry(
         "oracle+convex",
-        lambda: PrivilegedComposition("oracle+convex", OracleSite, PlannedDescent()),
+        lambda: PrivilegedComposition("oracle+convex", OracleSite.informed, PlannedDescent()),
         "the sites of oracle, flown by convex guidance",
         privileged=True,
     ),
@@ -78,13 +78,13 @@ ENTRIES: tuple[PolicyEntry, ...] = (
     ),
     PolicyEntry(
         "oracle-fuel",
-        lambda: PrivilegedComposition("oracle-fuel", CheapestSafeSite, PlannedDescent()),
+        lambda: PrivilegedComposition("oracle-fuel", CheapestSafeSite.informed, PlannedDescent()),
         "knows the true map: the cheapest truly safe ground with 2 m of clearance, by convex guidance",
         privileged=True,
     ),
     PolicyEntry(
         "hindsight",
-        lambda: PrivilegedComposition("hindsight", BestKnownSite, PlannedDescent()),
+        lambda: PrivilegedComposition("hindsight", BestKnownSite.informed, PlannedDescent()),
         "knows the true map: the cheapest truly safe ground that could have been seen, by convex guidance",
         privileged=True,
     ),

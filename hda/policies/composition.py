@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-from hda.ground.tile import Tile
+from guidance.arrays import Array
 from hda.policy import Command, Decision, DecisionStatus, Policy
 from hda.site_selection import SiteSelection
 from hda.task.observation import Observation, ScenarioView
+from hda.task.scenario import Scenario
 
 
 class GuidanceLaw(Protocol):
@@ -23,7 +23,7 @@ class GuidanceLaw(Protocol):
         ...
 
     def command(
-        self, observation: Observation, site: NDArray[np.float64], memory: Any
+        self, observation: Observation, site: Array, memory: Any
     ) -> tuple[Command, DecisionStatus, Any]:
         """Command for this decision, how it came about, and the memory for the next."""
         ...
@@ -60,15 +60,15 @@ class PrivilegedComposition:
 
     Attributes:
         name: name in tables.
-        make_selection: tile -> site selection.
+        make_selection: scenario -> site selection.
         guidance_law: how to fly there.
     """
 
     name: str
-    make_selection: Callable[[Tile], SiteSelection]
+    make_selection: Callable[[Scenario], SiteSelection]
     guidance_law: GuidanceLaw
     privileged: bool = field(default=True, init=False)
 
-    def informed(self, truth: Tile) -> Policy[Any]:
-        """Make the policy that knows this tile."""
+    def informed(self, truth: Scenario) -> Policy[Any]:
+        """Make the policy that knows this scenario."""
         return ComposedPolicy(self.name, self.make_selection(truth), self.guidance_law)

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.descent.plan import PlanStatus
 from guidance.planning.deferred_decision import DeferredDecision, plan_deferred
 from guidance.tracking.reference import TrackingReference
@@ -27,8 +28,6 @@ from hda.policies.site_price import HazardAwareWeights, landing_probability
 from hda.policies.surroundings import infer_unseen
 from hda.policy import Decision, DecisionStatus, PlanCommand
 from hda.task.observation import Observation, ScenarioView
-
-Array = NDArray[np.float64]
 
 _NEVER = 1e9  # [s] no later look counts in the ranking
 
@@ -168,7 +167,7 @@ class DeferredDecisionPolicy:
     ) -> Candidates:
         """The best site, then the best of those far enough from all before, and so on."""
         options, price = self.options, price.copy()
-        reach = max(math.ceil(options.separation) - 1, 0)
+        apart = max(math.ceil(options.separation) - 1, 0)
         present = belief.cell(observation.target)
         cells: list[tuple[int, int]] = []
         for _ in range(options.candidates):
@@ -182,7 +181,7 @@ class DeferredDecisionPolicy:
             ):
                 row, column = present
             cells.append((row, column))
-            price[max(row - reach, 0) : row + reach + 1, max(column - reach, 0) : column + reach + 1] = np.inf
+            price[max(row - apart, 0) : row + apart + 1, max(column - apart, 0) : column + apart + 1] = np.inf
         plane = float(observation.target[2])
         sites = np.array([belief.site(*cell, plane) for cell in cells])
         if cells[0] == present:
@@ -234,9 +233,8 @@ class DeferredDecisionPolicy:
         self, reference: TrackingReference, site: Array, memory: DeferredDecisionMemory
     ) -> tuple[Decision, DeferredDecisionMemory]:
         view = memory.view
-        periods = round(view.decision_interval / view.control_period)
         command = PlanCommand(reference, tracking_gains(view.control_period, self.descent.planned.weights))
-        descent = replace(memory.descent, site=site.copy(), reference=reference.after(periods))
+        descent = replace(memory.descent, site=site.copy(), reference=reference.after(view.control_periods))
         return Decision(site, command, DecisionStatus.NOMINAL), replace(memory, descent=descent)
 
     def _fly_to(

@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.constants import MOON_GRAVITY
 from guidance.lander import Lander
 from guidance.state import State
@@ -27,8 +27,7 @@ from hda.policies.site_price import (
 from hda.policies.surroundings import infer_unseen
 from hda.sensing.lidar import Lidar
 from hda.task.observation import Observation, ScenarioView
-
-Array = NDArray[np.float64]
+from hda.task.rules import Rules
 
 _SQUARE = 1.25  # half side of the belief's square in widths of the first look
 
@@ -97,7 +96,7 @@ def load_kernels() -> None:
     """Price a small blank square once per process: the first decision must not wait for compiled code."""
     gravity, plane = np.array(MOON_GRAVITY), np.zeros(3)
     lidar, lander = Lidar(), Lander()
-    view = ScenarioView(lander, gravity, plane, 5.0, 0.5, lidar.field_of_view, lidar.off_nadir_limit, lidar)
+    view = ScenarioView(lander, gravity, plane, Rules(), lidar)
     state = State(np.array([0.0, 0.0, 100.0]), np.zeros(3), 1200.0)
     reading = np.ones((lidar.pixels, lidar.pixels), dtype=np.float32)
     observation = Observation(0, 0.0, state, plane, reading, 16.0, 20.0)

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.descent.plan import PlanStatus
 from guidance.lander import Lander
 from guidance.state import State
@@ -30,7 +30,7 @@ class DescentMemory:
     """
 
     view: ScenarioView
-    site: NDArray[np.float64] | None = None
+    site: Array | None = None
     reference: TrackingReference | None = None
 
 
@@ -57,31 +57,31 @@ class PlannedDescent:
         return DescentMemory(view)
 
     def command(
-        self, observation: Observation, site: NDArray[np.float64], memory: DescentMemory
+        self, observation: Observation, site: Array, memory: DescentMemory
     ) -> tuple[Command, DecisionStatus, DescentMemory]:
         """Replan, or fly on."""
-        left = memory.reference
+        remaining = memory.reference
         same_site = memory.site is not None and np.array_equal(site, memory.site)
-        if same_site and left is not None and left.duration <= self.commit_time:
-            return self._track(left, DecisionStatus.NOMINAL, memory)
-        landing = self._plan(observation, site, memory, left if same_site else None)
-        if same_site and left is not None and (landing is None or landing.reference is None):
-            return self._track(left, DecisionStatus.NOMINAL, memory)  # the plan in flight is still good
+        if same_site and remaining is not None and remaining.duration <= self.commit_time:
+            return self._track(remaining, DecisionStatus.NOMINAL, memory)
+        landing = self._plan(observation, site, memory, remaining if same_site else None)
+        if same_site and remaining is not None and (landing is None or landing.reference is None):
+            return self._track(remaining, DecisionStatus.NOMINAL, memory)  # the plan in flight is still good
         if landing is not None and landing.reference is not None:
             nearest = landing.status is PlanStatus.NEAREST
             status = DecisionStatus.FALLBACK_NEAREST if nearest else DecisionStatus.NOMINAL
             return self._track(landing.reference, status, replace(memory, site=site.copy()))
-        if left is not None:
-            return self._track(left, DecisionStatus.FALLBACK_LAST_PLAN, memory)
+        if remaining is not None:
+            return self._track(remaining, DecisionStatus.FALLBACK_LAST_PLAN, memory)
         command, _, _ = FixedGainZemZev().command(observation, site, memory.view)
         return command, DecisionStatus.FALLBACK_ZEM_ZEV, replace(memory, site=None, reference=None)
 
     def _plan(
         self,
         observation: Observation,
-        site: NDArray[np.float64],
+        site: Array,
         memory: DescentMemory,
-        left: TrackingReference | None,
+        remaining: TrackingReference | None,
     ) -> SoftLanding | None:
         """Ask the planner; None where the question itself is out of its range, such as below the gate."""
         view, state = memory.view, observation.state
@@ -90,7 +90,7 @@ class PlannedDescent:
         duration = self.options.terminal_periods * view.control_period
         if state.position[2] - site[2] <= 0.5 * self.options.terminal_deceleration * duration**2:
             return None
-        periods = None if left is None else left.thrust_acceleration.shape[0]
+        periods = None if remaining is None else remaining.thrust_acceleration.shape[0]
         return plan_soft_landing(
             state, site, view.lander, view.control_period, self.options, view.gravity, periods
         )
@@ -99,9 +99,8 @@ class PlannedDescent:
         self, reference: TrackingReference, status: DecisionStatus, memory: DescentMemory
     ) -> tuple[PlanCommand, DecisionStatus, DescentMemory]:
         view = memory.view
-        gains = tracking_gains(view.control_period, self.weights)
-        periods = round(view.decision_interval / view.control_period)
-        return PlanCommand(reference, gains), status, replace(memory, reference=reference.after(periods))
+        command = PlanCommand(reference, tracking_gains(view.control_period, self.weights))
+        return command, status, replace(memory, reference=reference.after(view.control_periods))
 
 
 @lru_cache(maxsize=8)

@@ -6,7 +6,7 @@ At each look every cell of the belief's square is priced in kilogrammes of prope
 
 `safe` is the probability that a touchdown aimed at the cell ends on safe ground, under the landing
 dispersion. Should the site turn out unsafe, a later look must show another: `known` is the expected safe
-ground, among cells that are probably safe, within reach of a late divert from it, and `unknown` the expected
+ground, among cells that are probably safe, within range of a late divert from it, and `unknown` the expected
 safe ground among the others, within the field of view that the next look will have around it and not too far
 from the vertical. Unknown safe ground comes in islands, so exp(-unknown/island) is the Poisson probability
 that there is none; known ground is lost to surprises of a few square metres. Where no look is left to act
@@ -17,17 +17,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.kernel import compile_kernel
 from guidance.two_impulse import divert_cost
 from guidance.validation import finite_number
 from hda.policies.belief import SafetyBelief
 from hda.task.observation import Observation, ScenarioView
-
-Array = NDArray[np.float64]
 
 LATTICE = 8
 """[m] spacing at which propellant is estimated; it bends over hundreds of metres."""
@@ -40,9 +40,9 @@ class HazardAwareWeights:
     Attributes:
         failure_cost: [kg] of propellant that a failed landing is worth.
         divert_cost: [kg] of propellant that a late divert is expected to cost.
-        surprise_area: [m^2] of known safe ground in reach that lowers the risk by a factor e.
+        surprise_area: [m^2] of known safe ground in range of a divert that lowers the risk by a factor e.
         island_area: [m^2] of expected safe ground not yet seen that lowers the risk by a factor e.
-        divert_slope: [-] reach of a late divert over the height at the next look.
+        divert_slope: [-] range of a late divert over the height at the next look.
         dispersion: [m] standard deviation of the touchdown about the site, along each axis.
         switch_gain: [kg] by which another site must be better than the present one.
         commit_time: [s] with less time to go than this the site is kept, and a look is of no more use.
@@ -65,8 +65,24 @@ class HazardAwareWeights:
             finite_number(name, getattr(self, name), above=0.0)
 
 
-@dataclass(frozen=True)
-class NextLook:
+class _Prices(NamedTuple):
+    """What the kernel needs of `HazardAwareWeights`."""
+
+    failure: float
+    divert: float
+    surprise_area: float
+    island_area: float
+    divert_slope: float
+
+
+class _SafeAreas(NamedTuple):
+    """Integral images of the known and of the unknown safe ground."""
+
+    known: Array
+    unknown: Array
+
+
+class NextLook(NamedTuple):
     """Where the lander will be at the next look, coasting until then; lengths from the square's corner.
 
     Attributes:
@@ -114,29 +130,29 @@ def landing_probability(safe: NDArray[np.float32], dispersion: float) -> NDArray
         Shape (n, n); 0 within two cells of the square's edge.
     """
     edges = np.array([math.erf(edge / (dispersion * math.sqrt(2.0))) for edge in (0.5, 1.5, 2.5)])
-    share = np.diff(edges, prepend=0.0) * np.array([1.0, 0.5, 0.5]) / edges[-1]
+    weights = np.diff(edges, prepend=0.0) * np.array([1.0, 0.5, 0.5]) / edges[-1]
     out = np.empty_like(safe)
-    _smooth_into(safe, share, out)
+    _smooth_into(safe, weights, out)
     return out
 
 
 @compile_kernel
-def _smooth_into(safe: NDArray[np.float32], share: Array, out: NDArray[np.float32]) -> None:
+def _smooth_into(safe: NDArray[np.float32], weights: Array, out: NDArray[np.float32]) -> None:
     """Weighted mean over five cells along each axis; beyond the square nothing is safe."""
     n = safe.shape[0]
     across = np.zeros((n, n))
     for row in range(n):
         for column in range(2, n - 2):
-            total = share[0] * safe[row, column]
+            total = weights[0] * safe[row, column]
             for step in (1, 2):
-                total += share[step] * (safe[row, column - step] + safe[row, column + step])
+                total += weights[step] * (safe[row, column - step] + safe[row, column + step])
             across[row, column] = total
     out[:] = 0.0
     for row in range(2, n - 2):
         for column in range(n):
-            total = share[0] * across[row, column]
+            total = weights[0] * across[row, column]
             for step in (1, 2):
-                total += share[step] * (across[row - step, column] + across[row + step, column])
+                total += weights[step] * (across[row - step, column] + across[row + step, column])
             out[row, column] = total
 
 
@@ -176,25 +192,23 @@ def _sum_into(density: NDArray[np.float32], out: Array) -> None:
 def _box(area: Array, row: int, column: int, half: float) -> float:
     """Sum over the cells within `half` of a cell along each axis."""
     n = area.shape[0] - 1
-    reach = int(half)
-    low_row, high_row = max(row - reach, 0), min(row + reach + 1, n)
-    low, high = max(column - reach, 0), min(column + reach + 1, n)
+    cells = int(half)
+    low_row, high_row = max(row - cells, 0), min(row + cells + 1, n)
+    low, high = max(column - cells, 0), min(column + cells + 1, n)
     return area[high_row, high] - area[low_row, high] - area[high_row, low] + area[low_row, low]
 
 
 @compile_kernel
 def _price_cells(
     landing: NDArray[np.float32],
-    areas: tuple[Array, Array],
+    areas: _SafeAreas,
     propellant: Array,
-    next_look: tuple[float, float, float, float, bool],
-    weights: tuple[float, float, float, float, float],
-    out: NDArray[np.float64],
+    next_look: NextLook,
+    prices: _Prices,
+    out: Array,
 ) -> None:
     """Fill J; see the module's docstring."""
-    known_area, unknown_area = areas
-    east, north, height, half_width_slope, useful = next_look
-    failure, divert, surprise, island, divert_slope = weights
+    height = next_look.height
     n = landing.shape[0]
     for row in range(n):
         for column in range(n):
@@ -204,14 +218,14 @@ def _price_cells(
             price = (1.0 - s) * ((1.0 - t) * propellant[i, j] + t * propellant[i, j + 1])
             price += s * ((1.0 - t) * propellant[i + 1, j] + t * propellant[i + 1, j + 1])
             exponent = 0.0
-            if useful:
-                reach = max(divert_slope * height, 1.0)
-                across = (column + 0.5 - east) ** 2 + (row + 0.5 - north) ** 2
-                half_width = half_width_slope * math.sqrt(across + height * height)
-                exponent = _box(known_area, row, column, reach) / surprise
-                exponent += _box(unknown_area, row, column, half_width) / island
+            if next_look.useful:
+                divert_distance = max(prices.divert_slope * height, 1.0)
+                across = (column + 0.5 - next_look.east) ** 2 + (row + 0.5 - next_look.north) ** 2
+                half_width = next_look.half_width_slope * math.sqrt(across + height * height)
+                exponent = _box(areas.known, row, column, divert_distance) / prices.surprise_area
+                exponent += _box(areas.unknown, row, column, half_width) / prices.island_area
             risk = 1.0 - landing[row, column]
-            out[row, column] = price + risk * (divert + failure * math.exp(-exponent))
+            out[row, column] = price + risk * (prices.divert + prices.failure * math.exp(-exponent))
 
 
 def price_sites(
@@ -234,10 +248,10 @@ def price_sites(
     out = np.empty((n, n))
     _price_cells(
         landing_probability(safe, weights.dispersion),
-        (summed_area(known), summed_area(unknown)),
+        _SafeAreas(summed_area(known), summed_area(unknown)),
         propellant,
-        (next_look.east, next_look.north, next_look.height, next_look.half_width_slope, next_look.useful),
-        (
+        next_look,
+        _Prices(
             weights.failure_cost,
             weights.divert_cost,
             weights.surprise_area,

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.kernel import compile_kernel
 
 DISTANCE_EDGES = np.array([1.2, 1.6, 2.1, 2.5, 3.2, 4.5, 6.0, 8.0, 11.0, 15.0, 20.0])
@@ -27,7 +28,7 @@ TABLE = Path(__file__).with_name("surroundings.csv")
 
 
 @lru_cache(maxsize=1)
-def safe_share_table() -> NDArray[np.float64]:
+def safe_share_table() -> Array:
     """Share of safe ground, shape (classes, classes): row by distance to safe, column to unsafe cells."""
     return np.loadtxt(TABLE, delimiter=",")
 
@@ -99,7 +100,7 @@ def _infer_into(
     to_unsafe: NDArray[np.int32],
     seen: NDArray[np.bool_],
     class_of_square: NDArray[np.int64],
-    table: NDArray[np.float64],
+    table: Array,
     out: NDArray[np.float32],
 ) -> None:
     for row in range(out.shape[0]):

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.upright_time import upright_time_to_go
 from hda.policy import DecisionStatus, ZemZevCommand
 from hda.task.observation import Observation, ScenarioView
@@ -29,7 +29,7 @@ class FixedGainZemZev:
         return view
 
     def command(
-        self, observation: Observation, site: NDArray[np.float64], memory: ScenarioView
+        self, observation: Observation, site: Array, memory: ScenarioView
     ) -> tuple[ZemZevCommand, DecisionStatus, ScenarioView]:
         """Keep the clock for the same site, else ask the quartic, and for longer under a pointing limit."""
         remaining = observation.time_to_go

@@ -20,7 +20,7 @@ class LanderFootprint:
         strips: (s, 3) int, rows of the open squares between the pads: north, first east, last east.
         first_strip: (k + 1,) int, where the strips of each orientation begin in `strips`.
         pad_disc: (2 r + 1, 2 r + 1) bool, cells under a pad of radius r cells.
-        reach: [cells] from the centre to the outermost cell under a pad.
+        half_size: [cells] from the centre to the outermost cell under a pad.
         support: (c, 2) int, every cell under a pad or between the pads in some orientation.
     """
 
@@ -28,13 +28,13 @@ class LanderFootprint:
     strips: NDArray[np.int64]
     first_strip: NDArray[np.int64]
     pad_disc: NDArray[np.bool_]
-    reach: int
+    half_size: int
     support: NDArray[np.int64]
 
     @property
     def span(self) -> int:
         """[cells] least side of a map that holds the lander."""
-        return 2 * self.reach + 1
+        return 2 * self.half_size + 1
 
     def footprint_cells(self, orientation: int) -> NDArray[np.int64]:
         """(c, 2) offsets of the cells strictly inside the square of the pad centres of one orientation."""
@@ -105,7 +105,7 @@ def make_footprint(footprint_diameter: float, pad_diameter: float, pixel_size: f
         strips=np.array(strips, dtype=np.int64).reshape(-1, 3),
         first_strip=np.array(first_strip, dtype=np.int64),
         pad_disc=disc,
-        reach=outer,
+        half_size=outer,
         support=np.array(sorted(support), dtype=np.int64),
     )
 
@@ -116,8 +116,8 @@ def _corners(north: int, east: int) -> list[tuple[int, int]]:
 
 def _open_square(north: int, east: int) -> list[tuple[int, int, int]]:
     """Rows (north, first east, last east) of the cells strictly inside the square with this corner."""
-    reach = max(abs(north), abs(east))
-    span = np.arange(-reach, reach + 1)
+    farthest = max(abs(north), abs(east))
+    span = np.arange(-farthest, farthest + 1)
     rows, columns = span[:, None], span[None, :]
     inside = np.ones((span.size, span.size), dtype=bool)
     # Inside means nearer than every side: the outward normal of the side after a corner is corner + next

@@ -15,11 +15,12 @@ import numba
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from guidance.arrays import Array
 from guidance.kernel import compile_parallel_kernel
 from guidance.validation import finite_number
 from hda.safety.criteria import DEFAULT_CRITERIA, SafetyCriteria
 from hda.safety.lander_footprint import LanderFootprint, make_footprint
-from hda.safety.stable_planes import assess_rows
+from hda.safety.stable_planes import FootprintCells, RasterLimits, WorstCase, assess_rows
 
 HIGHEST = 1e9
 """[m] No ground is higher or deeper: such a number is a no-data value that nobody declared."""
@@ -41,9 +42,9 @@ class SafetyMap:
     """
 
     deterministic: NDArray[np.bool_]
-    probability: NDArray[np.float64]
-    slope: NDArray[np.float64]
-    roughness: NDArray[np.float64]
+    probability: Array
+    slope: Array
+    roughness: Array
 
 
 def assess_safety(
@@ -98,7 +99,7 @@ def assess_safety(
     return SafetyMap(deterministic, probability, slope, roughness)
 
 
-def elevation_array(dem: ArrayLike) -> NDArray[np.float64]:
+def elevation_array(dem: ArrayLike) -> Array:
     """Copy a DEM as float64 [m], shape (m, n); NaN where it is NaN or masked.
 
     Raises:
@@ -149,9 +150,8 @@ def _fit_footprint(criteria: SafetyCriteria, pixel_size: float, shape: tuple[int
 def _known_sites(hole: NDArray[np.bool_], footprint: LanderFootprint) -> NDArray[np.bool_]:
     """Where the lander fits on the map and stands over no hole."""
     known = np.zeros(hole.shape, dtype=np.bool_)
-    reach = footprint.reach
-    inner = (slice(reach, hole.shape[0] - reach), slice(reach, hole.shape[1] - reach))
-    known[inner] = True
+    edge = footprint.half_size
+    known[edge : hole.shape[0] - edge, edge : hole.shape[1] - edge] = True
     rows, columns = np.nonzero(hole)
     for north, east in footprint.support:
         row, column = rows - north, columns - east
@@ -161,25 +161,22 @@ def _known_sites(hole: NDArray[np.bool_], footprint: LanderFootprint) -> NDArray
 
 
 def _worst_case(
-    elevation: NDArray[np.float64], footprint: LanderFootprint, pixel_size: float, max_roughness: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Worst slope [rad], roughness [m] and height above the plane less its limit [m] of each cell."""
+    elevation: Array, footprint: LanderFootprint, pixel_size: float, max_roughness: float
+) -> WorstCase:
     pad_map = elevation
     if footprint.pad_disc.size > 1:
         from scipy.ndimage import maximum_filter
 
         pad_map = maximum_filter(elevation, footprint=footprint.pad_disc, mode="nearest")
-    slope = np.full(elevation.shape, np.nan)
-    roughness = np.full(elevation.shape, np.nan)
-    excess = np.full(elevation.shape, np.nan)
+    worst = WorstCase(*(np.full(elevation.shape, np.nan) for _ in WorstCase._fields))
     assess_rows(
         elevation,
         pad_map,
-        (footprint.pads, footprint.first_strip, footprint.strips, footprint.reach),
-        (pixel_size, max_roughness),
-        (slope, roughness, excess),
+        FootprintCells(footprint.pads, footprint.first_strip, footprint.strips, footprint.half_size),
+        RasterLimits(pixel_size, max_roughness),
+        worst,
     )
-    return slope, roughness, excess
+    return worst
 
 
 @compile_parallel_kernel

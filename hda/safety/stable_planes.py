@@ -6,10 +6,13 @@ Row by row, a block of columns at a time, so that the inner loops run over neigh
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numba
 import numpy as np
+from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.kernel import compile_kernel, compile_parallel_kernel
 
 COLUMN_BLOCK = 256  # sites of a row worked on together; their buffers stay in the first-level cache
@@ -62,22 +65,48 @@ def _highest_ground(elevation, row, start, n, strips, buffer):
             high_b[i] = b if b > high_b[i] else high_b[i]
 
 
+class FootprintCells(NamedTuple):
+    """What the kernel needs of a `LanderFootprint`, under the same names."""
+
+    pads: NDArray[np.int64]
+    first_strip: NDArray[np.int64]
+    strips: NDArray[np.int64]
+    half_size: int
+
+
+class RasterLimits(NamedTuple):
+    """[m] side of a cell, and greatest roughness."""
+
+    pixel_size: float
+    max_roughness: float
+
+
+class WorstCase(NamedTuple):
+    """Worst slope [rad], roughness [m] and height above the plane less its limit [m], of each cell."""
+
+    slope: Array
+    roughness: Array
+    excess: Array
+
+
 @compile_parallel_kernel
-def assess_rows(elevation, pad_map, footprint, scales, worst):
+def assess_rows(
+    elevation: Array, pad_map: Array, footprint: FootprintCells, limits: RasterLimits, worst: WorstCase
+) -> None:
     """Fill the three maps of `worst`, row by row: cells do not depend on one another.
 
     For an orientation, with pads 0 to 3 at opposite corners 0-2 and 1-3 and R pads' distance from the centre,
     the plane through the higher diagonal has along it the gradient (z0 - z2) / 2R and across it (z1 - h) / R
     or (h - z3) / R, where h is the height of the lander's centre, the mean of the diagonal's pads.
     """
-    pads, first_strip, strips, reach = footprint
-    pixel_size, max_roughness = scales
+    pads, first_strip, strips, half_size = footprint
+    pixel_size, max_roughness = limits
     slope, roughness, excess = worst
     rows, columns = elevation.shape
-    for row in numba.prange(reach, rows - reach):
+    for row in numba.prange(half_size, rows - half_size):
         buffer = np.empty((9, COLUMN_BLOCK))
-        for start in range(reach, columns - reach, COLUMN_BLOCK):
-            n = min(COLUMN_BLOCK, columns - reach - start)
+        for start in range(half_size, columns - half_size, COLUMN_BLOCK):
+            n = min(COLUMN_BLOCK, columns - half_size - start)
             steepest, roughest, most = slope[row, start:], roughness[row, start:], excess[row, start:]
             for i in range(n):
                 steepest[i], roughest[i], most[i] = 0.0, -np.inf, -np.inf

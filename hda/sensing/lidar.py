@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.kernel import compile_kernel
 from guidance.validation import finite_number
 
@@ -49,15 +50,15 @@ class Lidar:
         if self.pixels < 2:
             raise ValueError(f"pixels must be at least 2, got {self.pixels}")
 
-    def width(self, position: NDArray[np.float64], target: NDArray[np.float64]) -> float:
+    def width(self, position: Array, target: Array) -> float:
         """[m] side of the field of view when `position` looks at `target`, both shape (3,)."""
         return float(np.linalg.norm(position - target)) * math.tan(self.field_of_view)
 
 
 @compile_kernel
 def _look_into(
-    position: NDArray[np.float64],
-    target: NDArray[np.float64],
+    position: Array,
+    target: Array,
     probability: NDArray[np.float32],
     noise: NDArray[np.float32],
     sensor: tuple[float, float, float],
@@ -87,8 +88,8 @@ def _look_into(
 
 def look(
     lidar: Lidar,
-    position: NDArray[np.float64],
-    target: NDArray[np.float64],
+    position: Array,
+    target: Array,
     probability: NDArray[np.float32],
     noise: NDArray[np.float32],
 ) -> NDArray[np.float32]:

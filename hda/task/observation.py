@@ -8,9 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.lander import Lander
 from guidance.state import State
 from hda.sensing.lidar import Lidar
+from hda.task.rules import Rules
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,21 +23,30 @@ class ScenarioView:
         lander: the vehicle.
         gravity: [m/s^2] shape (3,).
         nominal_target: [m] shape (3,), the first target, on the target plane.
-        decision_interval: [s] time between looks.
-        control_period: [s] time over which a thrust is held.
-        field_of_view: [rad] the look's width is the slant range times its tangent.
-        off_nadir_limit: [rad] pixels further than this from the vertical read 0.
+        rules: timing, bounds of the dispersions, judgement.
         lidar: the sensor, with its known noise.
     """
 
     lander: Lander
-    gravity: NDArray[np.float64]
-    nominal_target: NDArray[np.float64]
-    decision_interval: float
-    control_period: float
-    field_of_view: float
-    off_nadir_limit: float
+    gravity: Array
+    nominal_target: Array
+    rules: Rules
     lidar: Lidar
+
+    @property
+    def decision_interval(self) -> float:
+        """[s] time between looks."""
+        return self.rules.decision_interval
+
+    @property
+    def control_period(self) -> float:
+        """[s] time over which a thrust is held."""
+        return self.rules.control_period
+
+    @property
+    def control_periods(self) -> int:
+        """Control periods between two looks."""
+        return self.rules.control_periods
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +66,7 @@ class Observation:
     index: int
     time: float
     state: State
-    target: NDArray[np.float64]
+    target: Array
     safety_map: NDArray[np.float32]
     width: float
     time_to_go: float
@@ -71,12 +82,12 @@ class Observation:
         return self.width / self.safety_map.shape[0]
 
     @property
-    def pixel_offset(self) -> NDArray[np.float64]:
+    def pixel_offset(self) -> Array:
         """[m] shape (n,), offset of pixel i (north) or j (east) from the target: ((i + 1/2)/n - 1/2) w."""
         n = self.safety_map.shape[0]
         return ((np.arange(n) + 0.5) / n - 0.5) * self.width
 
-    def site(self, row: int, column: int) -> NDArray[np.float64]:
+    def site(self, row: int, column: int) -> Array:
         """[m] shape (3,), centre of pixel (row, column) on the target plane."""
         n = self.safety_map.shape[0]
         return np.array(
@@ -87,7 +98,7 @@ class Observation:
             ]
         )
 
-    def pixel(self, site: NDArray[np.float64]) -> tuple[int, int] | None:
+    def pixel(self, site: Array) -> tuple[int, int] | None:
         """(row, column) of the pixel that contains `site` (its x and y count), or None outside the look."""
         n = self.safety_map.shape[0]
         row = math.floor(((site[1] - self.target[1]) / self.width + 0.5) * n)

@@ -16,6 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from guidance.arrays import Array
+
 _SCENARIO, _SENSOR, _ACTUATOR, _POLICY = range(4)
 _WORD = 2**32
 
@@ -65,7 +67,7 @@ class EpisodeStreams:
         """Standard normal noise of look `index`, shape (pixels, pixels)."""
         return self._generator(_SENSOR, index).standard_normal((pixels, pixels), dtype=np.float32)
 
-    def navigation_error(self, position_error: float, velocity_error: float) -> NDArray[np.float64]:
+    def navigation_error(self, position_error: float, velocity_error: float) -> Array:
         """Error of the estimated position [m] and velocity [m/s], shape (6,), one for the whole episode."""
         draw = self._generator(_SENSOR).standard_normal(6)
         return draw * np.repeat((position_error, velocity_error), 3)

@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.state import State
 from hda.ground.library import Ground, load_tile, tile_numbers
 from hda.ground.tile import Tile
@@ -38,10 +38,10 @@ class Scenario:
     streams: EpisodeStreams
     tile: Tile
     initial_state: State
-    nominal_target: NDArray[np.float64]
+    nominal_target: Array
 
     @property
-    def navigation_error(self) -> NDArray[np.float64]:
+    def navigation_error(self) -> Array:
         """Estimated minus true position [m] and velocity [m/s], shape (6,)."""
         rules = self.preset.rules
         sigmas = rules.navigation_position_error, rules.navigation_velocity_error
@@ -54,17 +54,28 @@ class Scenario:
             lander=self.preset.lander,
             gravity=np.array(self.preset.gravity),
             nominal_target=self.nominal_target.copy(),
-            decision_interval=self.preset.rules.decision_interval,
-            control_period=self.preset.rules.control_period,
-            field_of_view=self.preset.lidar.field_of_view,
-            off_nadir_limit=self.preset.lidar.off_nadir_limit,
+            rules=self.preset.rules,
             lidar=self.preset.lidar,
         )
 
 
-def draw_target(
-    tile: Tile, start: StartConditions, plane: float, rng: np.random.Generator
-) -> NDArray[np.float64]:
+def estimated_state(scenario: Scenario, state: State) -> State:
+    """The state as the lander estimates it: the true one plus the episode's navigation error."""
+    error = scenario.navigation_error
+    return State(state.position + error[:3], state.velocity + error[3:], state.mass)
+
+
+def ground_point(scenario: Scenario, site: Array) -> Array:
+    """[m] shape (3,), where a site in the frame of the estimated position really lies on the plane.
+
+    The lander points and places its looks relative to itself, so what it takes to be at `site` is off by the
+    horizontal error of its own position.
+    """
+    error = scenario.navigation_error
+    return site - np.array([error[0], error[1], 0.0])
+
+
+def draw_target(tile: Tile, start: StartConditions, plane: float, rng: np.random.Generator) -> Array:
     """Draw the first target: uniform over the target area, where enough of the ground around is unsafe.
 
     Raises:
@@ -84,7 +95,7 @@ def draw_target(
     )
 
 
-def draw_state(target: NDArray[np.float64], start: StartConditions, rng: np.random.Generator) -> State:
+def draw_state(target: Array, start: StartConditions, rng: np.random.Generator) -> State:
     """Draw the initial state around `target`."""
     altitude = start.altitude.draw(rng)
     distance = start.distance.draw(rng)

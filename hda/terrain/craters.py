@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.kernel import compile_kernel
 from guidance.validation import finite_number
 
@@ -94,32 +95,30 @@ class CraterPopulation:
 class Craters:
     """Craters that were drawn: arrays of equal length, in metres, positions from the south-west corner."""
 
-    east: NDArray[np.float64]
-    north: NDArray[np.float64]
-    diameter: NDArray[np.float64]
-    depth: NDArray[np.float64]
-    rim_height: NDArray[np.float64]
-    floor_diameter: NDArray[np.float64]
+    east: Array
+    north: Array
+    diameter: Array
+    depth: Array
+    rim_height: Array
+    floor_diameter: Array
 
 
-def pike_depth(diameter: NDArray[np.float64]) -> NDArray[np.float64]:
+def pike_depth(diameter: Array) -> Array:
     """[m] rim crest to floor of a fresh simple crater of `diameter` [m] (Pike 1977: 0.196 D^1.010, km)."""
     return 0.196 * (np.asarray(diameter) / KILOMETRE) ** 1.010 * KILOMETRE
 
 
-def pike_rim_height(diameter: NDArray[np.float64]) -> NDArray[np.float64]:
+def pike_rim_height(diameter: Array) -> Array:
     """[m] rim crest above the plain of a fresh simple crater (Pike 1977: 0.036 D^1.014, km)."""
     return 0.036 * (np.asarray(diameter) / KILOMETRE) ** 1.014 * KILOMETRE
 
 
-def pike_floor_diameter(diameter: NDArray[np.float64]) -> NDArray[np.float64]:
+def pike_floor_diameter(diameter: Array) -> Array:
     """[m] diameter of the flat floor of a fresh simple crater (Pike 1977: 0.031 D^1.765, km)."""
     return 0.031 * (np.asarray(diameter) / KILOMETRE) ** 1.765 * KILOMETRE
 
 
-def draw_depth(
-    population: CraterPopulation, diameter: NDArray[np.float64], rng: np.random.Generator
-) -> NDArray[np.float64]:
+def draw_depth(population: CraterPopulation, diameter: Array, rng: np.random.Generator) -> Array:
     """Draw the depth [m], rim crest to floor, of craters of `diameter` [m]."""
     if population.depth_law is DepthLaw.PIKE:
         return pike_depth(diameter)
@@ -148,26 +147,24 @@ def draw_craters(population: CraterPopulation, extent: float, rng: np.random.Gen
 
 @compile_kernel
 def _crater_elevation(
-    distance: float, radius: float, floor_radius: float, depth: float, rim_height: float, reach: float
+    distance: float, radius: float, floor_radius: float, depth: float, rim_height: float, ejecta_reach: float
 ) -> float:
     """Elevation above the plain at `distance` from the centre: flat floor, parabolic wall, ejecta as x^-3."""
     if distance <= radius:
         climb = max(distance - floor_radius, 0.0) / (radius - floor_radius)
         return rim_height - depth + depth * climb * climb
-    end = reach**-3.0
+    end = ejecta_reach**-3.0
     x = radius / distance
     return max(rim_height * (x * x * x - end) / (1.0 - end), 0.0)
 
 
 @compile_kernel
-def _add_craters(
-    relief: NDArray[np.float32], table: NDArray[np.float64], reach: float, pixel_size: float
-) -> None:
+def _add_craters(relief: NDArray[np.float32], table: Array, ejecta_reach: float, pixel_size: float) -> None:
     rows, columns = relief.shape
     for k in range(table.shape[0]):
         east, north, radius = table[k, 0] / pixel_size, table[k, 1] / pixel_size, table[k, 2] / pixel_size
         floor_radius, depth, rim_height = table[k, 3] / pixel_size, table[k, 4], table[k, 5]
-        outer = reach * radius
+        outer = ejecta_reach * radius
         for row in range(
             max(0, math.ceil(north - outer - 0.5)), min(rows, math.floor(north + outer - 0.5) + 1)
         ):
@@ -177,7 +174,7 @@ def _add_craters(
             for column in range(first, min(columns, math.floor(east + half - 0.5) + 1)):
                 de = column + 0.5 - east
                 relief[row, column] += _crater_elevation(
-                    math.sqrt(dn * dn + de * de), radius, floor_radius, depth, rim_height, reach
+                    math.sqrt(dn * dn + de * de), radius, floor_radius, depth, rim_height, ejecta_reach
                 )
 
 

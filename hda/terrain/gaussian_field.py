@@ -8,6 +8,8 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
+from guidance.arrays import Array
+
 
 @dataclass(frozen=True)
 class FieldSpectrum:
@@ -22,7 +24,7 @@ class FieldSpectrum:
     amplitude: NDArray[np.float32]
     period: int
 
-    def variance_per_column(self) -> NDArray[np.float64]:
+    def variance_per_column(self) -> Array:
         """Variance carried by each east-west frequency, shape (period // 2 + 1,)."""
         return (self.amplitude.astype(np.float64) ** 2).sum(axis=0) * _multiplicity(self.period) ** 2
 
@@ -31,7 +33,7 @@ class FieldSpectrum:
         return FieldSpectrum((self.amplitude * factor).astype(np.float32), self.period)
 
 
-def _multiplicity(period: int) -> NDArray[np.float64]:
+def _multiplicity(period: int) -> Array:
     """How many columns of the full transform each column of the real one stands for."""
     count = np.full(period // 2 + 1, 2.0)
     count[0] = 1.0
@@ -40,12 +42,12 @@ def _multiplicity(period: int) -> NDArray[np.float64]:
     return count
 
 
-def frequency_grid(period: int) -> NDArray[np.float64]:
+def frequency_grid(period: int) -> Array:
     """Radial frequency [cycles per cell] of each mode, shape (period, period // 2 + 1)."""
     return np.hypot(np.fft.fftfreq(period)[:, None], np.fft.rfftfreq(period)[None, :])
 
 
-def make_spectrum(density: NDArray[np.float64], period: int) -> FieldSpectrum:
+def make_spectrum(density: Array, period: int) -> FieldSpectrum:
     """Turn a power spectral density (any scale) on `frequency_grid(period)` into mode amplitudes."""
     # A mode and its mirror image add in amplitude: four times the variance, where twice is due.
     amplitude = np.sqrt(density / _multiplicity(period))

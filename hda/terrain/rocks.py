@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.kernel import compile_kernel
 from guidance.validation import finite_number
 
@@ -62,7 +63,7 @@ class RockPopulation:
         """[-] share of the ground under rocks of at least `diameter` [m], without the diameter limits."""
         return self.area_fraction * math.exp(-self.decay * diameter)
 
-    def density_above(self, diameter: NDArray[np.float64]) -> NDArray[np.float64]:
+    def density_above(self, diameter: Array) -> Array:
         """[1/m^2] expected number of rocks of at least `diameter` [m], without the upper limit.
 
         The law of area says that -dF/dD = (pi D^2 / 4) n(D); the integral of n is
@@ -82,11 +83,11 @@ class Rocks:
     Metres from the south-west corner; the azimuth [rad] of the long axis counts from east to north.
     """
 
-    east: NDArray[np.float64]
-    north: NDArray[np.float64]
-    diameter: NDArray[np.float64]
-    axis_ratio: NDArray[np.float64]
-    azimuth: NDArray[np.float64]
+    east: Array
+    north: Array
+    diameter: Array
+    axis_ratio: Array
+    azimuth: Array
 
     def __len__(self) -> int:
         """How many rocks there are."""
@@ -136,7 +137,7 @@ def _least_form(a: float, b: float, c: float, west: float, south: float, side: f
 
 
 @compile_kernel
-def _raise_rocks(heights: NDArray[np.float32], table: NDArray[np.float64], pixel_size: float) -> None:
+def _raise_rocks(heights: NDArray[np.float32], table: Array, pixel_size: float) -> None:
     rows, columns = heights.shape
     for k in range(table.shape[0]):
         east, north, radius = table[k, 0], table[k, 1], table[k, 2] / 2.0

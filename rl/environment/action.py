@@ -66,8 +66,8 @@ def decide_action(
     if not np.isfinite(values).all():
         raise ValueError(f"action must be finite, got {values.tolist()}")
     position_gain, velocity_gain, step, shift_x, shift_y = np.clip(values, -1.0, 1.0).tolist()
-    reach = ranges.shift * observation.width
-    site = observation.target + np.array([shift_x * reach, shift_y * reach, 0.0])
+    greatest = ranges.shift * observation.width
+    site = observation.target + np.array([shift_x * greatest, shift_y * greatest, 0.0])
     command = ZemZevCommand(
         position_gain=_between(ranges.position_gain, position_gain),
         velocity_gain=_between(ranges.velocity_gain, velocity_gain),

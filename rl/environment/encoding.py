@@ -13,7 +13,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from hda.task.observation import Observation
+from rl.inference.arrays import Array32
 
 ENCODING_VERSION = 1
 LATENT_BOUND = 8.0
@@ -55,12 +57,12 @@ class Layout:
     constant: tuple[str, ...]
 
     @cached_property
-    def center(self) -> NDArray[np.float64]:
+    def center(self) -> Array:
         """Shape (k,)."""
         return np.array([element.center for element in self.elements])
 
     @cached_property
-    def scale(self) -> NDArray[np.float64]:
+    def scale(self) -> Array:
         """Shape (k,)."""
         return np.array([element.scale for element in self.elements])
 
@@ -70,16 +72,16 @@ class Layout:
         return np.array([element.curved for element in self.elements])
 
     @cached_property
-    def low(self) -> NDArray[np.float32]:
+    def low(self) -> Array32:
         """Least encoded values, shape (k,)."""
         return np.array([element.low for element in self.elements], dtype=np.float32)
 
     @cached_property
-    def high(self) -> NDArray[np.float32]:
+    def high(self) -> Array32:
         """Greatest encoded values, shape (k,)."""
         return np.array([element.high for element in self.elements], dtype=np.float32)
 
-    def scaled(self, values: NDArray[np.float64]) -> NDArray[np.float32]:
+    def scaled(self, values: Array) -> Array32:
         """Encode the physical values of the elements, shape (k,)."""
         scaled = (values - self.center) / self.scale
         scaled[self.curved] = 0.5 * np.arcsinh(scaled[self.curved])
@@ -151,9 +153,7 @@ PRINTED = Layout(
 LAYOUTS = {layout.name: layout for layout in (RELATIVE, CURVED, PRINTED)}
 
 
-def encode_flight(
-    layout: Layout, observation: Observation, nominal_target: NDArray[np.float64]
-) -> NDArray[np.float32]:
+def encode_flight(layout: Layout, observation: Observation, nominal_target: Array) -> Array32:
     """Encode all of an observation but its map.
 
     Args:
@@ -179,9 +179,9 @@ def encode_flight(
 def encode_observation(
     layout: Layout,
     observation: Observation,
-    nominal_target: NDArray[np.float64],
-    latent: NDArray[np.float32],
-) -> NDArray[np.float32]:
+    nominal_target: Array,
+    latent: Array32,
+) -> Array32:
     """Join the encoded flight and the latent of the map: shape (44,)."""
     clipped = np.clip(latent, -LATENT_BOUND, LATENT_BOUND)
     return np.concatenate([encode_flight(layout, observation, nominal_target), clipped])

@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from hda.flight.episode import Flight, Step, ground_point
+from hda.flight.episode import Flight, Step
 from hda.flight.outcome import Ending, RewardTerms
-from hda.task.scenario import Scenario
+from hda.task.scenario import Scenario, ground_point
 
 ENDING_CODES = {ending: code for code, ending in enumerate(Ending, start=1)}
 """The number that stands for each ending in `info`; 0 is in flight."""

@@ -8,11 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hda.flight.episode import Step
+from hda.flight.palette import COLORS
+from hda.flight.picture import draw_field_of_view, draw_true_safety
 from hda.task.observation import Observation
 from hda.task.scenario import Scenario
 
 _SIZE = (10.0, 5.0)
 _DPI = 64
+_HALF_SIDE = 270.0  # [m] of the ground around the first target: every start of the paper's lies in it
 
 
 def render_flight(scenario: Scenario, steps: Sequence[Step], observation: Observation) -> NDArray[np.uint8]:
@@ -28,33 +31,26 @@ def render_flight(scenario: Scenario, steps: Sequence[Step], observation: Observ
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
-    from matplotlib.patches import Rectangle
 
     start = scenario.initial_state.position[None]
     path = np.concatenate([start, *(step.segment.path[1:, :3] for step in steps)])
     figure = Figure(_SIZE, dpi=_DPI, layout="constrained")
     canvas = FigureCanvasAgg(figure)
     ground, seen = figure.subplots(1, 2)
-    rows, columns = scenario.tile.deterministic.shape
-    ground.imshow(
-        scenario.tile.deterministic, cmap="gray", origin="lower", extent=(0, columns, 0, rows), vmin=0, vmax=1
-    )
-    ground.plot(path[:, 0], path[:, 1], color="tab:red")
-    ground.plot(*observation.target[:2], "+", color="tab:orange", markersize=10)
+    draw_true_safety(ground, scenario.tile)
+    draw_field_of_view(ground, observation)
+    ground.plot(path[:, 0], path[:, 1], color=COLORS[1])
+    ground.plot(*observation.target[:2], "+", color=COLORS[0], markersize=10)
     half = 0.5 * observation.width
-    corner = observation.target[:2] - half
-    ground.add_patch(Rectangle((corner[0], corner[1]), 2 * half, 2 * half, fill=False, color="tab:red"))
     middle = scenario.nominal_target
-    ground.set_xlim(middle[0] - 270, middle[0] + 270)
-    ground.set_ylim(middle[1] - 270, middle[1] + 270)
-    ground.set_xlabel("east [m]")
-    ground.set_ylabel("north [m]")
+    ground.set_xlim(middle[0] - _HALF_SIDE, middle[0] + _HALF_SIDE)
+    ground.set_ylim(middle[1] - _HALF_SIDE, middle[1] + _HALF_SIDE)
     height = path[-1, 2] - observation.target[2]
     ground.set_title(f"true safety; t = {observation.time:.0f} s, {height:.0f} m above the plane")
     seen.imshow(
         observation.safety_map, cmap="gray", origin="lower", vmin=0, vmax=1, extent=(-half, half, -half, half)
     )
-    seen.plot(0, 0, "+", color="tab:orange", markersize=10)
+    seen.plot(0, 0, "+", color=COLORS[0], markersize=10)
     seen.set_title("look: observed safety about the target [m]")
     canvas.draw()
     return np.asarray(canvas.buffer_rgba())[:, :, :3].copy()

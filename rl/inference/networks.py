@@ -10,16 +10,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from guidance.kernel import compile_kernel
+from rl.inference.arrays import Array32
 from rl.inference.artefacts import ArtefactError, Tensors
-
-Array = NDArray[np.float32]
 
 
 @compile_kernel
-def _gather_patches(image: Array) -> Array:
+def _gather_patches(image: Array32) -> Array32:
     """4 x 4 patches at stride 2 and padding 1: image (in, rows, columns) -> (in * 16, rows/2 * columns/2)."""
     channels, rows, columns = image.shape
     half = columns // 2
@@ -38,7 +36,7 @@ def _gather_patches(image: Array) -> Array:
 
 
 @compile_kernel
-def _convolve(image: Array, weight: Array, bias: Array) -> Array:
+def _convolve(image: Array32, weight: Array32, bias: Array32) -> Array32:
     """4 x 4 kernel, stride 2, padding 1, rectified; image (in, rows, columns), weight (out, in * 16)."""
     patches = _gather_patches(image)
     size = patches.shape[1]
@@ -58,7 +56,7 @@ def _convolve(image: Array, weight: Array, bias: Array) -> Array:
 
 
 @compile_kernel
-def _connect(inputs: Array, weight: Array, bias: Array, rectify: bool) -> Array:
+def _connect(inputs: Array32, weight: Array32, bias: Array32, rectify: bool) -> Array32:
     """Dense layer: inputs (in,), weight (in, out), bias (out,)."""
     out = bias.copy()
     for i in range(inputs.shape[0]):
@@ -72,7 +70,7 @@ def _connect(inputs: Array, weight: Array, bias: Array, rectify: bool) -> Array:
     return out
 
 
-def _array(tensors: Tensors, name: str, dimensions: int) -> Array:
+def _array(tensors: Tensors, name: str, dimensions: int) -> Array32:
     if name not in tensors or tensors[name].dtype != np.float32 or tensors[name].ndim != dimensions:
         raise ArtefactError(f"the weights need a {dimensions}-dimensional float32 tensor {name!r}")
     return np.ascontiguousarray(tensors[name])
@@ -87,8 +85,8 @@ class MapEncoder:
         dense: (weight (in, latent), bias (latent,)); its inputs run over rows, columns, channels.
     """
 
-    convolutions: tuple[tuple[Array, Array], ...]
-    dense: tuple[Array, Array]
+    convolutions: tuple[tuple[Array32, Array32], ...]
+    dense: tuple[Array32, Array32]
 
     @classmethod
     def from_tensors(cls, tensors: Tensors) -> MapEncoder:
@@ -107,7 +105,7 @@ class MapEncoder:
             tuple(convolutions), (_array(tensors, "latent.weight", 2), _array(tensors, "latent.bias", 1))
         )
 
-    def encode(self, safety_map: NDArray[np.float32]) -> Array:
+    def encode(self, safety_map: Array32) -> Array32:
         """Latent of one map, shape (latent,); the map has shape (64, 64)."""
         image = np.ascontiguousarray(safety_map, dtype=np.float32)[None]
         for weight, bias in self.convolutions:
@@ -123,7 +121,7 @@ class Perceptron:
         layers: (weight (in, out), bias (out,)) of each layer.
     """
 
-    layers: tuple[tuple[Array, Array], ...]
+    layers: tuple[tuple[Array32, Array32], ...]
 
     @classmethod
     def from_tensors(cls, tensors: Tensors, sizes: Sequence[int]) -> Perceptron:
@@ -146,7 +144,7 @@ class Perceptron:
             layers.append((weight, bias))
         return cls(tuple(layers))
 
-    def evaluate(self, inputs: NDArray[np.float32]) -> Array:
+    def evaluate(self, inputs: Array32) -> Array32:
         """Outputs of one row, without a final nonlinearity."""
         values = np.ascontiguousarray(inputs, dtype=np.float32)
         last = len(self.layers) - 1

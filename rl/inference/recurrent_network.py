@@ -7,19 +7,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from guidance.kernel import compile_kernel
+from rl.inference.arrays import Array32
 from rl.inference.artefacts import ArtefactError, Tensors
 from rl.inference.networks import Perceptron
-
-Array = NDArray[np.float32]
 
 
 @compile_kernel
 def _remember(
-    inputs: Array, hidden: Array, cell: Array, weights: tuple[Array, Array, Array]
-) -> tuple[Array, Array]:
+    inputs: Array32, hidden: Array32, cell: Array32, weights: tuple[Array32, Array32, Array32]
+) -> tuple[Array32, Array32]:
     """One step of an LSTM with gates in the order i, f, g, o (as torch): the new (hidden, cell)."""
     driving, recurrent, bias = weights
     size = hidden.shape[0]
@@ -55,7 +53,7 @@ class RecurrentNetwork:
         previous_reward: the history holds the last reward after the last action.
     """
 
-    lstm: tuple[Array, Array, Array]
+    lstm: tuple[Array32, Array32, Array32]
     present: Perceptron
     head: Perceptron
     previous_reward: bool
@@ -96,7 +94,9 @@ class RecurrentNetwork:
         """Size of the memory."""
         return self.lstm[1].shape[0]
 
-    def evaluate(self, observation: Array, history: Array, past: tuple[Array, Array]) -> tuple[Array, ...]:
+    def evaluate(
+        self, observation: Array32, history: Array32, past: tuple[Array32, Array32]
+    ) -> tuple[Array32, ...]:
         """Action before its tanh (5,), and the new memory (hidden, cell), each (memory,)."""
         hidden, cell = _remember(history, *past, self.lstm)
         present = np.maximum(self.present.evaluate(observation), np.float32(0.0))

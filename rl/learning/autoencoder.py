@@ -17,10 +17,13 @@ import torch
 from numpy.typing import NDArray
 from torch import nn
 
-from hda.flight.episode import advance, begin_flight, observe
+from hda.flight.episode import fly_legs
+from hda.policy import Decision
+from hda.task.observation import Observation
 from hda.task.presets import Preset
 from hda.task.scenario import sample_scenario
 from rl.environment.action import decide_action
+from rl.inference.arrays import Array32
 from rl.inference.artefacts import Tensors
 from rl.inference.latent import LATENT_SIZE
 
@@ -77,6 +80,13 @@ class AutoencoderSettings:
     center_width: float = 0.2
 
 
+def decide_at_random(
+    observation: Observation, rng: np.random.Generator
+) -> tuple[Decision, np.random.Generator]:
+    """A uniform random action, drawn from the stream that is the memory."""
+    return decide_action(rng.uniform(-1.0, 1.0, 5), observation), rng
+
+
 def collect_maps(
     preset: Preset, split: str, rollouts: int, seed: int, on_progress: Callable[[int], None] | None = None
 ) -> Maps:
@@ -96,12 +106,8 @@ def collect_maps(
     maps = []
     for episode in range(rollouts):
         scenario = sample_scenario(preset, seed, episode, split)
-        flight, outcome = begin_flight(scenario), None
-        while outcome is None:
-            observation = observe(scenario, flight)
-            maps.append(np.round(observation.safety_map * 255.0).astype(np.uint8))
-            step = advance(scenario, flight, decide_action(rng.uniform(-1.0, 1.0, 5), observation))
-            flight, outcome = step.flight, step.outcome
+        for leg in fly_legs(scenario, decide_at_random, rng):
+            maps.append(np.round(leg.observation.safety_map * 255.0).astype(np.uint8))
         if on_progress is not None:
             on_progress(1)
     return np.stack(maps)
@@ -166,7 +172,7 @@ class ReconstructionError:
 
 
 @torch.no_grad()
-def reconstruct(network: Autoencoder, maps: Maps) -> NDArray[np.float32]:
+def reconstruct(network: Autoencoder, maps: Maps) -> Array32:
     """Reconstructions of the maps, shape (n, 64, 64) in [0, 1]."""
     parts = []
     for first in range(0, len(maps), 512):

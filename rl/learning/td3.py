@@ -24,7 +24,7 @@ class FastTD3(TD3):
     Attributes:
         control_prior: asked at each update for the weight of the actor's penalty for the squares of the
             inputs of its last tanh, of all elements but the shift of the target; it draws the gains to 6/2
-            and the clock to its own pace. A critic of landings that end in +1, -1 or -10 errs by more than
+            and the rate of the clock to 1. A critic of landings that end in +1, -1 or -10 errs by more than
             the gains are worth, and an actor that follows its errors lands hard.
     """
 

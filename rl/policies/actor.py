@@ -8,13 +8,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from hda.policy import Decision
 from hda.task.observation import Observation, ScenarioView
 from hda.task.rules import Range
 from rl.environment.action import PAPER_ACTIONS, ActionRanges, decide_action
 from rl.environment.encoding import ENCODING_VERSION, LAYOUTS, Layout, encode_observation
+from rl.inference.arrays import Array32
 from rl.inference.artefacts import WEIGHTS_FOLDER, Artefact, ArtefactError, load_artefact, require
 from rl.inference.latent import LATENT_SIZE, load_autoencoder, load_encoder
 from rl.inference.networks import MapEncoder, Perceptron
@@ -36,13 +37,13 @@ class Actor:
     network: Perceptron
     ranges: ActionRanges = PAPER_ACTIONS
 
-    def act(self, observation: Observation, nominal_target: NDArray[np.float64]) -> NDArray[np.float32]:
+    def act(self, observation: Observation, nominal_target: Array) -> Array32:
         """Action of shape (5,) in [-1, 1]."""
         latent = self.encoder.encode(observation.safety_map)
         vector = encode_observation(self.layout, observation, nominal_target, latent)
         return np.tanh(self.network.evaluate(vector))
 
-    def decide(self, observation: Observation, nominal_target: NDArray[np.float64]) -> Decision:
+    def decide(self, observation: Observation, nominal_target: Array) -> Decision:
         """Decision of the action."""
         return decide_action(self.act(observation, nominal_target), observation, self.ranges)
 
@@ -104,7 +105,7 @@ class AgentPolicy:
     name: str
     weights: Path
 
-    def begin(self, scenario_view: ScenarioView, rng: np.random.Generator) -> NDArray[np.float64]:
+    def begin(self, scenario_view: ScenarioView, rng: np.random.Generator) -> Array:
         """Read the weights, remember the first target.
 
         Raises:
@@ -113,9 +114,7 @@ class AgentPolicy:
         load_actor(self.weights)
         return scenario_view.nominal_target
 
-    def decide(
-        self, observation: Observation, memory: NDArray[np.float64]
-    ) -> tuple[Decision, NDArray[np.float64]]:
+    def decide(self, observation: Observation, memory: Array) -> tuple[Decision, Array]:
         """Decide from this observation alone."""
         return load_actor(self.weights).decide(observation, memory), memory
 
@@ -132,13 +131,11 @@ class ActorPolicy:
     name: str
     actor: Actor = field(repr=False)
 
-    def begin(self, scenario_view: ScenarioView, rng: np.random.Generator) -> NDArray[np.float64]:
+    def begin(self, scenario_view: ScenarioView, rng: np.random.Generator) -> Array:
         """Remember the first target."""
         return scenario_view.nominal_target
 
-    def decide(
-        self, observation: Observation, memory: NDArray[np.float64]
-    ) -> tuple[Decision, NDArray[np.float64]]:
+    def decide(self, observation: Observation, memory: Array) -> tuple[Decision, Array]:
         """Decide from this observation alone."""
         return self.actor.decide(observation, memory), memory
 
@@ -155,7 +152,7 @@ class AgentSite:
 
     weights: Path
 
-    def begin(self, view: ScenarioView) -> NDArray[np.float64]:
+    def begin(self, view: ScenarioView) -> Array:
         """Read the weights, remember the first target.
 
         Raises:
@@ -164,9 +161,7 @@ class AgentSite:
         load_actor(self.weights)
         return view.nominal_target
 
-    def select(
-        self, observation: Observation, memory: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def select(self, observation: Observation, memory: Array) -> tuple[Array, Array]:
         """Site of the agent's decision."""
         return load_actor(self.weights).decide(observation, memory).site, memory
 

@@ -7,20 +7,19 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from hda.flight.outcome import score_step
 from hda.policy import Decision
 from hda.task.observation import Observation, ScenarioView
 from rl.environment.action import PAPER_ACTIONS, ActionRanges, decide_action
 from rl.environment.encoding import Layout, encode_observation
+from rl.inference.arrays import Array32
 from rl.inference.artefacts import Artefact, ArtefactError, load_artefact
 from rl.inference.latent import LATENT_SIZE, load_encoder
 from rl.inference.networks import MapEncoder
 from rl.inference.recurrent_network import RecurrentNetwork
 from rl.policies.actor import read_actor_card
-
-Array = NDArray[np.float32]
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,11 +36,11 @@ class FlightMemory:
         mass: [kg] at the last decision; None before the first.
     """
 
-    nominal_target: NDArray[np.float64]
+    nominal_target: Array
     dry_mass: float
-    hidden: Array
-    cell: Array
-    action: Array
+    hidden: Array32
+    cell: Array32
+    action: Array32
     first_mass: float | None = None
     mass: float | None = None
 

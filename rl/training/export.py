@@ -108,6 +108,8 @@ def run_export(options: ExportWeights) -> None:
         for row in read_rows(chosen.run / "validation.csv")
     ]
     training = {
+        "recipe": first["recipe"],
+        "planned_steps": first["plan"]["steps"],
         "command": training_command(first, chosen.seed),
         "settings": asdict(settings),
         "preset": preset.name,

@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import traceback
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
-from contextlib import nullcontext
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -225,29 +224,6 @@ def join_chunks(study: Study, chunks: Iterable[Chunk]) -> StudyResult:
             name: np.concatenate([chunk.decision_time[name] for chunk in ordered]) for name in study.policies
         },
     )
-
-
-def run_study(
-    study: Study, executor: Executor | None = None, on_progress: Callable[[int], None] | None = None
-) -> StudyResult:
-    """Fly a study in memory, without retries.
-
-    Args:
-        study: what to fly; its tiles must exist (`prepare_study`), or each process builds them when it meets
-            them.
-        executor: runs the chunks; None flies them here.
-        on_progress: called with the number of episodes (times policies) that were just finished.
-
-    Raises:
-        PolicyError: a policy raised something.
-        WorkerDiedError: a worker died.
-    """
-    chunks = []
-    for chunk in fly_chunks(study, chunk_bounds(study), lambda: nullcontext(executor), most_attempts=1):
-        chunks.append(chunk)
-        if on_progress is not None:
-            on_progress((chunk.last - chunk.first) * len(study.policies))
-    return join_chunks(study, chunks)
 
 
 def prepare_study(study: Study, workers: int) -> None:

@@ -109,12 +109,23 @@ def _digest(*places: Path) -> str:
 
 def describe_study(study: Study, flight: dict[str, Any]) -> dict[str, Any]:
     """What the study is, and how it was made: source commit, command, sessions and retries."""
+    return {**identify_study(study), **_describe_making(), "flight": flight}
+
+
+def describe_run(options: Any) -> dict[str, Any]:
+    """As `describe_study`, for a run that is no single study: its options stand for the parameters.
+
+    Args:
+        options: dataclass of the command line.
+    """
+    return {**identify_software(), **_describe_making(), "options": asdict(options)}
+
+
+def _describe_making() -> dict[str, Any]:
     return {
-        **identify_study(study),
         "command": " ".join(sys.argv),
         "finished": datetime.now(UTC).isoformat(timespec="seconds"),
         "git_commit": git_commit(),
-        "flight": flight,
     }
 
 

@@ -1,4 +1,4 @@
-"""What the commands that fly several studies in one run ask alike."""
+"""What the commands that keep finished work, and those that fly several studies in one run, ask alike."""
 
 from __future__ import annotations
 
@@ -13,8 +13,26 @@ from studies.campaign.study_folder import Existing
 
 
 @dataclass(frozen=True, kw_only=True)
-class RunOptions:
-    """Options of a run; a command adds its own, and describes those that mean something else there.
+class FolderOptions:
+    """Options of a run that keeps finished work in a folder.
+
+    Attributes:
+        out: folder for results.
+        resume: keep finished work of the same study in the folder, and do what is missing.
+    """
+
+    out: Path
+    resume: bool = False
+
+    @property
+    def existing(self) -> Existing:
+        """What to do with a folder that holds a study."""
+        return Existing.RESUME if self.resume else Existing.REFUSE
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunOptions(FolderOptions):
+    """Options of a run that flies policies; a command adds its own, and describes those that differ there.
 
     Attributes:
         policies: names of policies; `default` is every one that is not slow and not made for another
@@ -23,8 +41,6 @@ class RunOptions:
         study_seed: seed of the study; equal seeds give equal episodes.
         split: tile split: validation or fresh.
         workers: processes; changes nothing but the time.
-        out: folder for results.
-        resume: keep finished episodes of the same study in the folder, and fly what is missing.
         figures: draw the figure.
     """
 
@@ -33,8 +49,6 @@ class RunOptions:
     study_seed: int = 0
     split: str = "validation"
     workers: int = 2
-    out: Path
-    resume: bool = False
     figures: bool = True
 
     def __post_init__(self) -> None:
@@ -42,8 +56,3 @@ class RunOptions:
         finite_number("episodes", self.episodes, at_least=1)
         finite_number("workers", self.workers, at_least=1)
         finite_number("study_seed", self.study_seed, at_least=0)
-
-    @property
-    def existing(self) -> Existing:
-        """What to do with a folder that holds a study."""
-        return Existing.RESUME if self.resume else Existing.REFUSE

@@ -78,23 +78,25 @@ def write_shard(folder: Path, chunk: Chunk, session: str) -> Path:
     return path
 
 
-def read_shard(path: Path, policies: Collection[str] | None = None) -> tuple[Chunk, str]:
+def read_shard(
+    path: Path, policies: Collection[str] | None = None, *, checked: bool = False
+) -> tuple[Chunk, str]:
     """Read a chunk back, with the session that flew it.
 
     Args:
         path: the file.
         policies: only the rows of these; of all by default.
+        checked: its checksum was found right before, so it is not computed again.
 
     Raises:
-        ShardError: the file is damaged or does not hold what its name says.
+        ShardError: the file is damaged, of another format, or does not hold what its name says.
         OSError: it cannot be read.
     """
     head, _, body = path.read_bytes().partition(b"\n")
     try:
         header = json.loads(head)
-        if header["format"] != SHARD_FORMAT or tuple(header["columns"]) != ROW_COLUMNS:
-            raise ShardError(f"{path} was written by another version")
-        if hashlib.sha256(body).hexdigest() != header["sha256"]:
+        _check_version(path, header)
+        if not checked and hashlib.sha256(body).hexdigest() != header["sha256"]:
             raise ShardError(f"{path} is damaged: its checksum does not hold")
         lines = body.splitlines()
         if policies is not None:
@@ -109,6 +111,19 @@ def read_shard(path: Path, policies: Collection[str] | None = None) -> tuple[Chu
     if path.name != shard_path(path.parent, chunk.first, chunk.last).name:
         raise ShardError(f"{path} holds episodes {chunk.first} to {chunk.last - 1}")
     return chunk, session
+
+
+def _check_version(path: Path, header: dict[str, Any]) -> None:
+    """Refuse a shard of an unknown format or of other columns, and say which."""
+    held = header["format"]
+    if type(held) is not int or held != SHARD_FORMAT:
+        raise ShardError(
+            f"{path} was written by another version: shard format {held!r}, this one reads {SHARD_FORMAT}"
+        )
+    columns = tuple(header["columns"])
+    if columns != ROW_COLUMNS:
+        odd = ", ".join(sorted(map(str, {*columns} ^ {*ROW_COLUMNS}))) or "the same in another order"
+        raise ShardError(f"{path} was written by another version: other columns ({odd})")
 
 
 def _parse_chunk(header: dict[str, Any], lines: list[dict[str, Any]]) -> Chunk:

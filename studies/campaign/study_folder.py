@@ -90,29 +90,32 @@ class StudyFolder:
                 path.unlink()
         return finished, damages
 
-    def read_chunks(self, policies: Collection[str] | None = None) -> Iterator[Chunk]:
+    def read_chunks(
+        self, policies: Collection[str] | None = None, *, checked: bool = False
+    ) -> Iterator[Chunk]:
         """The chunks of the whole study in the order of their episodes, one at a time.
 
         Args:
             policies: only the rows of these; of all by default.
+            checked: all were read once before, so their checksums are not computed again.
 
         Raises:
             ShardError: a shard is damaged.
             OSError: one is missing.
         """
         for first, last in chunk_bounds(self.study):
-            yield read_shard(shard_path(self.shards, first, last), policies)[0]
+            yield read_shard(shard_path(self.shards, first, last), policies, checked=checked)[0]
 
     def store(self, chunk: Chunk) -> None:
         """Keep a finished chunk; when this returns, it is on the disk."""
         write_shard(self.shards, chunk, self.session)
 
     def describe_flight(self) -> dict[str, Any]:
-        """For the provenance: the runs of the program that flew the study, and the retried chunks."""
+        """For the provenance, once the chunks were read: the runs of the program, and the retried chunks."""
         sessions: dict[str, int] = {}
         retries = []
         for first, last in chunk_bounds(self.study):
-            chunk, session = read_shard(shard_path(self.shards, first, last), policies=())
+            chunk, session = read_shard(shard_path(self.shards, first, last), policies=(), checked=True)
             sessions[session] = sessions.get(session, 0) + last - first
             if chunk.attempts > 1:
                 retries.append({"episodes": [first, last - 1], "attempts": chunk.attempts})

@@ -7,39 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hda.flight.palette import COLORS, line_style, marker_style
+from studies.campaign.score import label_measure
 from studies.compare.differences import PairedDifference
-from studies.compare.figures import COLORS
 from studies.compare.histograms import MeasureHistograms
 from studies.compare.table import PolicySummary
 from studies.paper import PAPER_ROWS
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
-
-DASHES = ("solid", "dash", "dot")
-SYMBOLS = ("circle", "square", "diamond")
-LABELS = {
-    "reward": "reward",
-    "miss_distance_m": "distance to the final target [m]",
-    "touchdown_speed_mps": "final speed [m/s]",
-    "propellant_percent": "propellant burnt [%]",
-    "minimum_slant_angle_deg": "minimum slant angle [deg]",
-    "maximum_thrust_n": "maximum thrust [N]",
-}
-
-
-def line_style(index: int) -> dict[str, Any]:
-    """Colour and dash of the policy of a number; both together are its own up to 24 policies."""
-    return {
-        "color": COLORS[index % len(COLORS)],
-        "dash": DASHES[index // len(COLORS) % len(DASHES)],
-        "width": 2,
-    }
-
-
-def _marker(index: int) -> dict[str, Any]:
-    symbol = SYMBOLS[index // len(COLORS) % len(SYMBOLS)]
-    return {"color": COLORS[index % len(COLORS)], "symbol": symbol, "size": 10}
 
 
 def draw_ratio_against_propellant(summaries: Sequence[PolicySummary]) -> Figure:
@@ -56,7 +32,7 @@ def draw_ratio_against_propellant(summaries: Sequence[PolicySummary]) -> Figure:
                 error_x=_bars([(propellant.estimate, propellant.low, propellant.high)]),
                 error_y=_bars([(100.0 * safe.estimate, 100.0 * safe.low, 100.0 * safe.high)]),
                 mode="markers",
-                marker=_marker(index),
+                marker=marker_style(index),
                 name=summary.policy,
             )
         )
@@ -137,17 +113,17 @@ def draw_histogram(measure: str, histograms: MeasureHistograms) -> Figure:
             )
         )
     figure.update_layout(showlegend=False, height=260)
-    return _finish(figure, LABELS[measure], "episodes")
+    return _finish(figure, label_measure(measure), "episodes")
 
 
 def _bars(ends: Sequence[tuple[float, float, float]]) -> dict[str, Any]:
-    # an interval may reach beyond any picture (one episode alone): such an end is not drawn
-    reach = [(high - middle, middle - low) for middle, low, high in ends]
+    # an interval may lie beyond any picture (one episode alone): such an end is not drawn
+    lengths = [(high - middle, middle - low) for middle, low, high in ends]
     return {
         "type": "data",
         "symmetric": False,
-        "array": [up if np.isfinite(up) else 0.0 for up, _ in reach],
-        "arrayminus": [down if np.isfinite(down) else 0.0 for _, down in reach],
+        "array": [up if np.isfinite(up) else 0.0 for up, _ in lengths],
+        "arrayminus": [down if np.isfinite(down) else 0.0 for _, down in lengths],
         "thickness": 1.5,
     }
 

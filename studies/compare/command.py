@@ -23,6 +23,7 @@ from hda.registry import policy_entry
 from hda.task.own_ground import place_preset
 from hda.task.presets import Preset, find_preset
 from studies.campaign.command_line import choose_policies, open_folder, resumable
+from studies.campaign.episode_files import write_episodes
 from studies.campaign.executor import OpenExecutor, local_processes
 from studies.campaign.missing_chunks import find_missing, fly_missing
 from studies.campaign.monte_carlo import Study, prepare_study
@@ -36,7 +37,6 @@ from studies.compare.table import (
     PolicySummary,
     print_table,
     summarize_policy,
-    write_episodes,
     write_markdown,
     write_table,
     write_timings,
@@ -229,7 +229,12 @@ def write_results(folder: StudyFolder, study: Study, options: Comparison) -> lis
     provenance = describe_study(folder.study, folder.describe_flight())
     write_episodes(
         out,
-        (row for name in study.policies for chunk in folder.read_chunks((name,)) for row in chunk.rows[name]),
+        (
+            row
+            for name in study.policies
+            for chunk in folder.read_chunks((name,), checked=True)  # by the scores
+            for row in chunk.rows[name]
+        ),
     )
     write_table(out / "table.csv", summaries)
     write_markdown(out / "table.md", summaries)

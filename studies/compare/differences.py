@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from studies.campaign.rows import MEASURES, RATIOS
+from studies.campaign.score import MEASURE_COLUMNS, RATIO_COLUMNS, Score, scaled
+from studies.columns import Column, Output, format_p, write_csv
 from studies.compare.scores import StudyScores
 from studies.statistics.moments import mean_intervals
 from studies.statistics.paired import holm_adjust, pair_count_interval
@@ -63,23 +64,43 @@ def compare_pairs(scores: StudyScores, policies: Sequence[str]) -> list[PairedDi
     return found
 
 
+def _points_column(name: str, heading: str) -> Column[PairedDifference]:
+    return Column(
+        f"{name}_points",
+        heading,
+        lambda difference: scaled(difference.ratios[name], 100.0),
+        unit="points",
+        interval=True,
+        form="{:+.1f}".format,
+    )
+
+
+def _mean_column(column: Column[Score]) -> Column[PairedDifference]:
+    """The difference of a mean, under the same names and with the same digits."""
+    name = column.key
+    return Column(
+        name,
+        column.heading,
+        lambda difference: difference.means[name],
+        unit=column.unit,
+        label=column.label,
+        interval=True,
+        by_tile=lambda difference: difference.means_by_tile[name],
+        form=f"{{:+.{column.digits}f}}".format,
+    )
+
+
+DIFFERENCE_COLUMNS: tuple[Column[PairedDifference], ...] = (
+    Column("policy", "policy", lambda difference: difference.policy, words=True),
+    Column("reference", "reference", lambda difference: difference.reference, outputs=Output.FILE),
+    *(_points_column(column.stem, column.heading) for column in RATIO_COLUMNS),
+    Column("mcnemar_p", "p", lambda difference: difference.mcnemar_p, form=format_p),
+    Column("holm_p", "p (Holm)", lambda difference: difference.holm_p, form=format_p),
+    *(_mean_column(column) for column in MEASURE_COLUMNS),
+)
+"""The paired differences: ratios in percentage points, means in the units of their names."""
+
+
 def write_paired(path: Path, differences: Sequence[PairedDifference]) -> None:
-    """Write the differences as CSV: ratios in percentage points, means in the units of their names."""
-    header = ["policy", "reference"]
-    header += [f"{name}_points{end}" for name in RATIOS for end in ("", "_low", "_high")]
-    header += ["mcnemar_p", "holm_p"]
-    header += [f"{name}{end}" for name in MEASURES for end in ("", "_low", "_high")]
-    header += [f"{name}_tile_{end}" for name in MEASURES for end in ("low", "high")]
-    with path.open("w", newline="") as stream:
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(header)
-        for difference in differences:
-            cells = [100.0 * value for name in RATIOS for value in _ends(difference.ratios[name])]
-            cells += [difference.mcnemar_p, difference.holm_p]
-            cells += [value for name in MEASURES for value in _ends(difference.means[name])]
-            cells += [value for name in MEASURES for value in _ends(difference.means_by_tile[name])[1:]]
-            writer.writerow([difference.policy, difference.reference, *(f"{value:.9g}" for value in cells)])
-
-
-def _ends(interval: Interval) -> tuple[float, float, float]:
-    return interval.estimate, interval.low, interval.high
+    """Write the differences as CSV."""
+    write_csv(path, DIFFERENCE_COLUMNS, differences)

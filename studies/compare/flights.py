@@ -13,12 +13,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hda.flight.episode import fly
+from hda.flight.outcome import ENDINGS
+from hda.flight.picture import save_flight
 from hda.flight.record import EpisodeRecord
 from hda.ground.tile import Tile
 from hda.policy import ZemZevCommand
 from hda.task.scenario import sample_scenario
 from studies.campaign.monte_carlo import Study
-from studies.compare.figures import save_flight
 from studies.compare.scores import StudyScores
 
 MOST_FLIGHTS = 130
@@ -27,15 +28,6 @@ _GROUND_CELLS = 72
 _GROUND_CELL = 8  # [m] a terrain patch of 576 m holds every start (250 m from its target)
 _TRUTH_CELLS = 200  # cells of 1 m around the first target whose true safety is shown
 _MOST_NODES = 240
-
-ENDINGS = {
-    "success": "landed softly on safe ground",
-    "hard-landing": "reached safe ground, but too fast to be a success",
-    "unsafe-site": "touched down on hazardous ground",
-    "crash": "hit the ground faster than the crash speed",
-    "tank-empty": "ran out of propellant above the ground",
-    "timed-out": "was still in flight after its last decision",
-}
 
 
 @dataclass(frozen=True)

@@ -10,11 +10,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
-import numpy as np
-from numpy.typing import NDArray
-
 from studies.campaign.monte_carlo import Chunk
 from studies.campaign.rows import MEASURES, RATIOS, EpisodeRow
+from studies.campaign.score import RunningScore, measured
 from studies.compare.histograms import DecisionTimes, MeasureHistograms
 from studies.statistics.moments import TileMoments
 from studies.statistics.ratios import PairCounts
@@ -25,15 +23,11 @@ FAILURES_KEPT = 12
 
 @dataclass
 class PolicyScore:
-    """Running score of one policy.
+    """Running score of one policy beside the reference policy's.
 
     Attributes:
         policy: name.
-        episodes: episodes so far.
-        successes: safe_site, success -> tile -> number of them.
-        flown: tile -> episodes.
-        fallbacks: decisions in which the policy's own law gave no answer.
-        means: moments of MEASURES.
+        running: its own score so far.
         differences: moments of MEASURES less the reference policy's.
         pairs: safe_site, success -> this policy against the reference.
         decision_time: how long decisions took.
@@ -41,11 +35,7 @@ class PolicyScore:
     """
 
     policy: str
-    episodes: int = 0
-    successes: dict[str, dict[int, int]] = field(default_factory=lambda: {name: {} for name in RATIOS})
-    flown: dict[int, int] = field(default_factory=dict)
-    fallbacks: int = 0
-    means: TileMoments = field(default_factory=lambda: TileMoments(len(MEASURES)))
+    running: RunningScore = field(default_factory=RunningScore)
     differences: TileMoments = field(default_factory=lambda: TileMoments(len(MEASURES)))
     pairs: dict[str, PairCounts] = field(
         default_factory=lambda: {name: PairCounts(0, 0, 0, 0) for name in RATIOS}
@@ -55,26 +45,14 @@ class PolicyScore:
 
     def add(self, row: EpisodeRow, reference: EpisodeRow) -> None:
         """Add an episode, with the reference policy's row of the same episode."""
-        self.episodes += 1
-        self.flown[row.tile] = self.flown.get(row.tile, 0) + 1
-        self.fallbacks += row.fallbacks
-        values = measured(row)
-        self.means.add(row.tile, values)
-        self.differences.add(row.tile, values - measured(reference))
+        self.running.add(row)
+        self.differences.add(row.tile, measured(row) - measured(reference))
         for name in RATIOS:
-            own, other = getattr(row, name), getattr(reference, name)
-            of_tile = self.successes[name]
-            of_tile[row.tile] = of_tile.get(row.tile, 0) + own
-            self.pairs[name] = add_pair(self.pairs[name], own, other)
+            self.pairs[name] = add_pair(self.pairs[name], getattr(row, name), getattr(reference, name))
         if not row.success:
             count, first = self.failures.get(row.outcome, (0, []))
             kept = [*first, row.episode] if len(first) < FAILURES_KEPT else first
             self.failures[row.outcome] = count + 1, kept
-
-    def count_successes(self, name: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Successes and episodes of each tile, tiles ascending."""
-        tiles = sorted(self.flown)
-        return np.array([self.successes[name][t] for t in tiles]), np.array([self.flown[t] for t in tiles])
 
 
 def add_pair(pairs: PairCounts, first: bool, second: bool) -> PairCounts:
@@ -85,11 +63,6 @@ def add_pair(pairs: PairCounts, first: bool, second: bool) -> PairCounts:
         pairs.only_second + (second and not first),
         pairs.neither + (not first and not second),
     )
-
-
-def measured(row: EpisodeRow) -> NDArray[np.float64]:
-    """MEASURES of a row."""
-    return np.array([getattr(row, name) for name in MEASURES], dtype=np.float64)
 
 
 @dataclass

@@ -7,10 +7,9 @@ from flying the same episode with a noiseless map or an exact engine (`studies.f
 
 from __future__ import annotations
 
-import csv
 import json
 from collections import Counter
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
@@ -25,7 +24,9 @@ from hda.task.presets import PRESETS, Preset
 from hda.task.scenario import sample_scenario
 from studies.campaign.command_line import one_line_errors, open_folder
 from studies.campaign.monte_carlo import Study
+from studies.campaign.provenance import describe_run, write_provenance
 from studies.campaign.shards import read_shard
+from studies.columns import Column, field_columns, write_csv
 from studies.compare.flights import ENDINGS
 from studies.failures.causes import Cause, Failure, explain_failure, find_remedies
 
@@ -148,10 +149,13 @@ def show_failures(options: Failures) -> dict[str, list[Failure]]:
         if options.figures:
             from studies.failures.picture import draw_failure
 
-            draw_failure(out / picture_name(name, episode), record, describe_failure(failure))
-    write_csv(out / "failures.csv", explained)
+            figure = draw_failure(record, describe_failure(failure))
+            figure.savefig(out / picture_name(name, episode), dpi=75)
+    rows = [(name, failure) for name, failures in explained.items() for failure in failures]
+    write_csv(out / "failures.csv", COLUMNS, rows)
     flown = {name: len(failed[name]) for name in chosen}
     write_markdown(out / "failures.md", study, explained, flown, options.figures)
+    write_provenance(out / "provenance.json", describe_run(options))
     return explained
 
 
@@ -160,20 +164,12 @@ def picture_name(policy: str, episode: int) -> str:
     return f"{policy}-{episode:06d}.png"
 
 
-def write_csv(path: Path, explained: dict[str, list[Failure]]) -> None:
-    """Write every failure, a field a column."""
-    names = [field.name for field in fields(Failure)]
-    with path.open("w", newline="") as stream:
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(["policy", *names])
-        for policy, failures in explained.items():
-            for failure in failures:
-                values = asdict(failure) | {
-                    "cause": failure.cause.value,
-                    "remedies": "; ".join(failure.remedies),
-                }
-                row = [values[name] for name in names]
-                writer.writerow([policy, *(f"{v:.6g}" if isinstance(v, float) else v for v in row)])
+COLUMNS: tuple[Column[tuple[str, Failure]], ...] = (
+    Column("policy", "policy", lambda row: row[0]),
+    *(column.through(lambda row: row[1]) for column in field_columns(Failure) if column.key != "remedies"),
+    Column("remedies", "remedies", lambda row: "; ".join(row[1].remedies)),
+)
+"""failures.csv: policy and failure, a field a column."""
 
 
 def write_markdown(

@@ -3,24 +3,25 @@
 from __future__ import annotations
 
 import textwrap
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hda.flight.episode import ground_point
+from hda.flight.palette import COLORS
+from hda.flight.picture import draw_ground_track
 from hda.flight.record import EpisodeRecord
 from hda.task.observation import Observation
-from studies.compare.figures import COLORS, draw_ground_track
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 _LOOKS = 4  # last looks that are shown
 _NEAR = 15.0  # [m] around the touchdown that is shown
 
 
-def draw_failure(path: Path, record: EpisodeRecord, words: str) -> None:
+def draw_failure(record: EpisodeRecord, words: str) -> Figure:
     """Draw the ground track, speed and height, the ground at the touchdown, and the last looks."""
     from matplotlib.figure import Figure
 
@@ -34,7 +35,7 @@ def draw_failure(path: Path, record: EpisodeRecord, words: str) -> None:
         _draw_look(figure.add_subplot(grid[1, 3 * k : 3 * k + 3]), record, observation)
     episode = f"{record.policy}, {record.scenario.preset.name}, episode {record.scenario.streams.episode}: "
     figure.suptitle("\n".join(textwrap.wrap(episode + words, 150)), fontsize="medium")
-    figure.savefig(path, dpi=75)
+    return figure
 
 
 def _draw_descent(axis: Axes, record: EpisodeRecord) -> None:
@@ -45,8 +46,8 @@ def _draw_descent(axis: Axes, record: EpisodeRecord) -> None:
     axis.set_ylim(bottom=0.0)
     speed = np.linalg.norm(record.velocity, axis=1)
     axis.plot(record.time, speed, color=COLORS[1], label="speed [m/s]")
-    share = 10.0 * np.linalg.norm(record.thrust, axis=1) / record.scenario.preset.lander.max_thrust
-    axis.stairs(share, record.time, baseline=None, color="0.6", label="thrust [tenths of the greatest]")
+    tenths = 10.0 * np.linalg.norm(record.thrust, axis=1) / record.scenario.preset.lander.max_thrust
+    axis.stairs(tenths, record.time, baseline=None, color="0.6", label="thrust [tenths of the greatest]")
     for observation in record.observations:
         axis.axvline(observation.time, color="0.85", linewidth=0.7, zorder=0)
     axis.legend(loc="lower left", fontsize="x-small", framealpha=0.9)
@@ -85,8 +86,8 @@ def _draw_look(axis: Axes, record: EpisodeRecord, observation: Observation) -> N
     axis.plot(*site[:2], "+", color=COLORS[0], markersize=11, markeredgewidth=1.8, label="chosen here")
     axis.set_xlim(x - half, x + half)
     axis.set_ylim(y - half, y + half)
-    left = float(record.time[-1]) - observation.time
-    axis.set_title(f"look {observation.index}, {left:.1f} s before the end", fontsize="small")
+    before_end = float(record.time[-1]) - observation.time
+    axis.set_title(f"look {observation.index}, {before_end:.1f} s before the end", fontsize="small")
     axis.tick_params(labelsize="x-small")
     axis.ticklabel_format(useOffset=False)
     if observation.index == record.observations[-1].index:

@@ -35,8 +35,10 @@ from rl.policies.actor import shipped, weights_name
 from rl.settings import RECIPES
 from rl.training.candidates import Choice
 from studies.campaign.command_line import one_line_errors, open_folder
+from studies.campaign.provenance import describe_run, write_provenance
+from studies.columns import write_csv
 from studies.memory.answer import GroupRow, compare_groups, conclude
-from studies.memory.report import draw_memory, markdown, write_csv
+from studies.memory.report import COLUMNS, draw_memory, markdown
 from studies.memory.scores import collect_scores, read_progress
 
 
@@ -193,10 +195,12 @@ def study_memory(options: MemoryStudy) -> tuple[GroupRow, ...]:
         for agent in options.agents
         if found[preset, agent] < options.seeds
     ]
-    write_csv(out / "memory.csv", rows)
+    write_csv(out / "memory.csv", COLUMNS, rows)
     text = markdown(rows, sentences)
     (out / "memory.md").write_text(text)
-    draw_memory(out / "memory.png", rows, scores)
+    draw_memory(rows, scores).savefig(out / "memory.png", dpi=110)
+    sources_told = {"sources": [str(source) for source in sources]}
+    write_provenance(out / "provenance.json", describe_run(options) | sources_told)
     console.print(text, markup=False, highlight=False, soft_wrap=True)
     console.print(f"results in {out}")
     return rows

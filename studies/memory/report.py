@@ -2,67 +2,69 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Sequence
-from pathlib import Path
+from typing import TYPE_CHECKING
 
+from studies.columns import Column, Output, markdown_lines
 from studies.compare.figures import COLORS
 from studies.memory.answer import MEASURES, GroupRow
 from studies.memory.scores import AgentScore
-from studies.statistics.ratios import Interval
 
-_INTERVALS = ("interquartile_mean", "improvement", "difference")
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
-
-def write_csv(path: Path, rows: Sequence[GroupRow]) -> None:
-    """Write every row; an interval takes three columns, and is empty where there is none."""
-    names = [f"{name}{end}" for name in _INTERVALS for end in ("", "_low", "_high")]
-    with path.open("w", newline="") as stream:
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(["preset", "agent", "measure", "seeds", "episodes", *names, "verdict"])
-        for row in rows:
-            cells: list[str] = []
-            for name in _INTERVALS:
-                interval: Interval = getattr(row, name)
-                values = (interval.estimate, interval.low, interval.high)
-                cells += ["" if math.isnan(value) else f"{value:.6g}" for value in values]
-            writer.writerow(
-                [row.preset, row.agent, row.measure, row.seeds, row.episodes, *cells, row.verdict]
-            )
+_TO = " to "
 
 
-def _shown(interval: Interval, form: str) -> str:
-    if math.isnan(interval.estimate):
-        return ""
-    if math.isnan(interval.low) or math.isinf(interval.low):
-        return format(interval.estimate, form)
-    return f"{interval.estimate:{form}} ({interval.low:{form}} to {interval.high:{form}})"
+def _name_measure(row: GroupRow) -> str:
+    return row.measure.removesuffix("_percent").replace("_", " ")
+
+
+COLUMNS: tuple[Column[GroupRow], ...] = (
+    Column("preset", "preset", lambda row: row.preset, words=True),
+    Column("agent", "agent", lambda row: row.agent, words=True),
+    Column("measure", "measure", lambda row: row.measure, outputs=Output.FILE),
+    Column("measure", "measure", _name_measure, words=True, outputs=Output.DOCUMENT),
+    Column("seeds", "seeds", lambda row: row.seeds),
+    Column("episodes", "episodes", lambda row: row.episodes, outputs=Output.FILE),
+    Column(
+        "interquartile_mean",
+        "interquartile mean",
+        lambda row: row.interquartile_mean,
+        digits=1,
+        unit="%",
+        interval=True,
+        between=_TO,
+    ),
+    Column(
+        "improvement",
+        "better than without memory",
+        lambda row: row.improvement,
+        digits=2,
+        interval=True,
+        between=_TO,
+    ),
+    Column(
+        "difference",
+        "points",
+        lambda row: row.difference,
+        form="{:+.1f}".format,
+        interval=True,
+        between=_TO,
+    ),
+    Column("verdict", "verdict", lambda row: row.verdict, outputs=Output.FILE),
+)
+"""The table: memory.csv and memory.md read this list."""
 
 
 def markdown(rows: Sequence[GroupRow], sentences: Sequence[str]) -> str:
     """Table and answer as Markdown."""
-    lines = [
-        "| preset | agent | measure | seeds | interquartile mean, % | better than without memory | points |",
-        "|---|---|---|---|---|---|---|",
-    ]
-    for row in rows:
-        cells = [
-            row.preset,
-            row.agent,
-            row.measure.removesuffix("_percent").replace("_", " "),
-            str(row.seeds),
-        ]
-        cells += [
-            _shown(row.interquartile_mean, ".1f"),
-            _shown(row.improvement, ".2f"),
-            _shown(row.difference, "+.1f"),
-        ]
-        lines.append("| " + " | ".join(cells) + " |")
+    lines = markdown_lines(COLUMNS, rows)
     return "\n".join([*lines, "", *(f"- {sentence}" for sentence in sentences)]) + "\n"
 
 
-def draw_memory(path: Path, rows: Sequence[GroupRow], scores: Sequence[AgentScore]) -> None:
+def draw_memory(rows: Sequence[GroupRow], scores: Sequence[AgentScore]) -> Figure:
     """Draw each preset's agents: every seed, the interquartile mean and its interval."""
     from matplotlib.figure import Figure
 
@@ -88,4 +90,4 @@ def draw_memory(path: Path, rows: Sequence[GroupRow], scores: Sequence[AgentScor
         axis.grid(axis="y", alpha=0.25)
     grid[0, 0].set_ylabel("safe site [%]")
     figure.suptitle("every seed, and the interquartile mean with its 95 % interval")
-    figure.savefig(path, dpi=110)
+    return figure

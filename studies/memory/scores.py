@@ -9,6 +9,8 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
+from rl.policies.actor import weights_name
+from rl.settings import RECIPES
 from rl.training.candidates import Choice, best_of_run
 from rl.training.run_folder import read_rows, read_run
 
@@ -119,12 +121,11 @@ def scores_of_card(path: Path) -> list[AgentScore]:
     """
     try:
         training = json.loads(path.read_text())["training"]
-        command = training["command"].split()
-        steps = int(command[command.index("--steps") + 1])
+        agent, steps = _recipe_and_steps(path, training)
         settings = _settings_digest(training["settings"])
         return [
             AgentScore(
-                agent=command[command.index("rl.train") + 1],
+                agent=agent,
                 preset=training["preset"],
                 seed=int(entry["seed"]),
                 source=str(path),
@@ -141,6 +142,23 @@ def scores_of_card(path: Path) -> list[AgentScore]:
         ]
     except (KeyError, TypeError, IndexError, AttributeError, ValueError, RecursionError) as error:
         raise ValueError(f"{path} is not a card of exported weights: {error!r}") from error
+
+
+def _recipe_and_steps(path: Path, training: dict[str, Any]) -> tuple[str, int]:
+    """What a card's agents were trained with, and for how long.
+
+    The first cards do not say: they go by the name of their recipe and preset, and their curve ends with the
+    training.
+
+    Raises:
+        ValueError: neither tells the recipe.
+    """
+    if "recipe" in training:
+        return str(training["recipe"]), int(training["planned_steps"])
+    for recipe in RECIPES:
+        if path.stem == weights_name(recipe, training["preset"]):
+            return recipe, int(training["curve"][-1]["step"])
+    raise ValueError("it does not name its recipe, nor does its file name")
 
 
 def collect_scores(

@@ -8,7 +8,6 @@ breaks.md tells which policy breaks first and why: the ending that became more f
 
 from __future__ import annotations
 
-import csv
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -24,19 +23,24 @@ from guidance.console import tolerate_encoding
 from guidance.validation import finite_number
 from hda.flight.episode import fly
 from hda.ground.library import Ground, load_tile, tile_numbers
-from hda.registry import policy_entry
 from hda.task.presets import Preset, find_preset
 from hda.task.scenario import sample_scenario
 from studies.campaign.command_line import choose_policies, open_folder, resumable
 from studies.campaign.monte_carlo import Study
-from studies.campaign.point_score import SCORE_COLUMNS, score_rows
-from studies.campaign.points import Point, Rows, fly_points
-from studies.campaign.provenance import describe_study, write_provenance
+from studies.campaign.points import Point, fly_points
+from studies.campaign.provenance import describe_run, write_provenance
 from studies.campaign.run_options import RunOptions
+from studies.columns import write_csv, write_markdown
 from studies.failures.causes import explain_failure
-from studies.robustness.breaks import Break, find_breaks, success_drop
+from studies.robustness.breaks import Break, find_breaks
 from studies.robustness.factors import FACTORS, Factor, choose_factors
-from studies.statistics.ratios import wilson_interval
+from studies.robustness.table import (
+    BREAK_COLUMNS,
+    LEVEL_COLUMNS,
+    Sweep,
+    list_levels,
+    write_level_markdown,
+)
 
 _NOMINAL = "nominal"
 _EXPLAINED = 12  # failures of a break that are flown again
@@ -68,25 +72,6 @@ class Robustness(RunOptions):
         finite_number("levels", self.levels, at_least=1)
 
 
-@dataclass(frozen=True)
-class Sweep:
-    """One flown factor.
-
-    Attributes:
-        factor: what was varied.
-        own: the preset's own value.
-        levels: value -> rows, the own value among them, rising.
-        hazard: value -> measured share of unsafe ground on the tiles.
-        breaks: where policies break, the earliest first.
-    """
-
-    factor: Factor
-    own: float
-    levels: dict[float, Rows]
-    hazard: dict[float, float]
-    breaks: list[Break]
-
-
 def plan_points(options: Robustness) -> tuple[Study, list[Point]]:
     """The study at the preset's own values, and every point of the sweep, that one first.
 
@@ -110,10 +95,10 @@ def _label(factor: Factor, level: float) -> str:
 def measure_hazard(preset: Preset, split: str) -> float:
     """Share of unsafe cells on the tiles of a split."""
     ground = Ground(preset.terrain, preset.criteria)
-    shares = [
+    unsafe = [
         1.0 - float(load_tile(ground, number, split).deterministic.mean()) for number in tile_numbers(split)
     ]
-    return float(np.mean(shares))
+    return float(np.mean(unsafe))
 
 
 def run_robustness(options: Robustness) -> list[Sweep]:
@@ -139,7 +124,7 @@ def run_robustness(options: Robustness) -> list[Sweep]:
         breaks = find_breaks(factor.name, value, flown[_NOMINAL], others)
         sweeps.append(Sweep(factor, value, levels, hazard, breaks))
     write_sweeps(out, sweeps, studies, options)
-    write_provenance(out / "provenance.json", describe_study(own, {"points": [p.label for p in points]}))
+    write_provenance(out / "provenance.json", describe_run(options))
     return sweeps
 
 
@@ -158,72 +143,19 @@ def write_sweeps(
 ) -> None:
     """Write a table and a figure per factor, and the breaks."""
     for sweep in sweeps:
-        write_levels(out / f"{sweep.factor.name}.csv", sweep, options.study_seed)
+        write_csv(out / f"{sweep.factor.name}.csv", LEVEL_COLUMNS, list_levels(sweep))
         write_level_markdown(out / f"{sweep.factor.name}.md", sweep)
         if options.figures:
             from studies.robustness.picture import draw_sweep
 
-            draw_sweep(out / f"{sweep.factor.name}.png", sweep.factor.label, sweep.own, sweep.levels)
+            figure = draw_sweep(sweep.factor.label, sweep.own, sweep.levels)
+            figure.savefig(out / f"{sweep.factor.name}.png", dpi=90)
     found = [(b, studies[_label(FACTORS[b.factor], b.level)]) for sweep in sweeps for b in sweep.breaks]
-    reasons = [explain_break(b, study) for b, study in track(found, "explaining breaks", transient=True)]
-    write_breaks(out, [b for b, _ in found], reasons)
-
-
-def write_levels(path: Path, sweep: Sweep, study_seed: int) -> None:
-    """Write every level and policy of a factor as CSV; ratios in percent."""
-    endings = ("hard-landing", "unsafe-site", "crash", "tank-empty", "timed-out")
-    header = ["factor", "level", "own_value", "hazard_percent", "policy", "privileged", "episodes"]
-    header += [*SCORE_COLUMNS, "success_drop_points", "drop_low", "drop_high"]
-    header += [name.replace("-", "_") for name in endings]
-    nominal = sweep.levels[sweep.own]
-    with path.open("w", newline="") as stream:
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(header)
-        for level, policies in sweep.levels.items():
-            for policy, rows in policies.items():
-                cells: list[object] = [sweep.factor.name, f"{level:.6g}", level == sweep.own]
-                cells += [f"{100.0 * sweep.hazard[level]:.4g}", policy, policy_entry(policy).privileged]
-                cells += [len(rows), *score_rows(rows, study_seed).cells()]
-                drop = success_drop(nominal[policy], rows)
-                cells += [f"{100.0 * value:.9g}" for value in (drop.estimate, drop.low, drop.high)]
-                counts = Counter(row.outcome for row in rows)
-                writer.writerow([*cells, *(counts[name] for name in endings)])
-
-
-def write_level_markdown(path: Path, sweep: Sweep) -> None:
-    """Write the successes of a factor for a document: a line per policy, a column per level."""
-    levels = [f"**{level:.4g}**" if level == sweep.own else f"{level:.4g}" for level in sweep.levels]
-    lines = [f"{sweep.factor.label}: success %, Wilson's 95 % interval; the preset's own value is bold", ""]
-    lines += ["| policy | " + " | ".join(levels) + " |", "|---|" + "---:|" * len(levels)]
-    for policy in sweep.levels[sweep.own]:
-        cells = []
-        for rows in sweep.levels.values():
-            low_high = wilson_interval(sum(row.success for row in rows[policy]), len(rows[policy]))
-            ends = (low_high.estimate, low_high.low, low_high.high)
-            cells.append("{:.1f} ({:.1f}-{:.1f})".format(*(100.0 * value for value in ends)))
-        star = " *" if policy_entry(policy).privileged else ""
-        lines.append(f"| {policy}{star} | " + " | ".join(cells) + " |")
-    path.write_text("\n".join(lines) + "\n")
-
-
-def write_breaks(out: Path, breaks: Sequence[Break], reasons: Sequence[str]) -> None:
-    """Write where policies break, as CSV and for a document; the first to break leads its factor."""
-    with (out / "breaks.csv").open("w", newline="") as stream:
-        writer = csv.writer(stream, lineterminator="\n")
-        names = ["factor", "side", "step", "policy", "level", "success_percent", "drop_points", "drop_low"]
-        writer.writerow([*names, "drop_high", "ending", "more_failures", "causes"])
-        for b, reason in zip(breaks, reasons, strict=True):
-            ends = (b.success, b.drop.estimate, b.drop.low, b.drop.high)
-            percent = [f"{100.0 * value:.9g}" for value in ends]
-            row = [b.factor, b.side, b.step, b.policy, f"{b.level:.6g}", *percent, b.ending, b.more, reason]
-            writer.writerow(row)
-    lines = ["| factor | policy | breaks at | success % | drop, points | by | causes |"]
-    lines.append("|---|---|---:|---:|---:|---|---|")
-    for b, reason in zip(breaks, reasons, strict=True):
-        drop = "{:.1f} ({:.1f}-{:.1f})".format(*(100 * v for v in (b.drop.estimate, b.drop.low, b.drop.high)))
-        cells = [b.factor, b.policy, f"{b.level:g}", f"{100 * b.success:.1f}", drop, b.ending, reason]
-        lines.append("| " + " | ".join(cells) + " |")
-    (out / "breaks.md").write_text("\n".join(lines) + "\n")
+    explained = [
+        (b, explain_break(b, study)) for b, study in track(found, "explaining breaks", transient=True)
+    ]
+    write_csv(out / "breaks.csv", BREAK_COLUMNS, explained)
+    write_markdown(out / "breaks.md", BREAK_COLUMNS, explained)
 
 
 def print_sweeps(sweeps: Sequence[Sweep]) -> None:

@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hda.flight.palette import line_style
 from studies.campaign.points import Rows
-from studies.compare.charts import line_style
 from studies.statistics.ratios import wilson_interval
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _PANELS = (("safe_site", "safe site [%]"), ("success", "success [%]"))
 
 
-def draw_sweep(path: Path, label: str, own: float, levels: Mapping[float, Rows]) -> None:
+def draw_sweep(label: str, own: float, levels: Mapping[float, Rows]) -> Figure:
     """Draw safe sites and successes against a factor's value, with Wilson's intervals.
 
     Args:
-        path: PNG to write.
         label: of the axis.
         own: the preset's own value, marked.
         levels: value -> rows of each policy, rising.
@@ -59,4 +61,4 @@ def draw_sweep(path: Path, label: str, own: float, levels: Mapping[float, Rows])
         axis.grid(alpha=0.25)
     handles, labels = axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside right center", frameon=False, fontsize="small")
-    figure.savefig(path, dpi=90)
+    return figure

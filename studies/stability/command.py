@@ -7,24 +7,23 @@ thrust is held over each control period, down to cut-off at half a period.
 
 from __future__ import annotations
 
-import csv
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import tyro
 from rich.console import Console
 from rich.progress import track
-from rich.table import Table
 
 from guidance.console import tolerate_encoding
 from guidance.validation import finite_number
-from hda.task.presets import Preset, find_preset
+from hda.task.presets import find_preset
 from studies.campaign.command_line import one_line_errors, open_folder
+from studies.campaign.provenance import describe_run, write_provenance
+from studies.columns import console_table, field_columns, write_csv, write_markdown
 from studies.stability.conclusions import conclude
 from studies.stability.sweep import GainRow, MarginRow, Requirement, gain_box, gain_row, margin_row
+from studies.stability.table import GAIN_COLUMNS
 
 _TIMES = (0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 10.0, 20.0, 40.0, 80.0)
 
@@ -61,49 +60,8 @@ class Stability:
         return Requirement(math.radians(self.phase_margin), self.gain_margin)
 
 
-def write_rows(path: Path, rows: Sequence[Any]) -> None:
-    """Write equal dataclasses as CSV, a field a column."""
-    names = [field.name for field in fields(rows[0])]
-    with path.open("w", newline="") as stream:
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(names)
-        for row in rows:
-            values = [getattr(row, name) for name in names]
-            writer.writerow([f"{v:.9g}" if isinstance(v, float) else v for v in values])
-
-
-def print_gains(rows: Sequence[GainRow], preset: Preset) -> None:
-    """Print one line per pair of gains."""
-    period = preset.rules.control_period
-    table = Table(title=f"ZEM/ZEV, control period {period:g} s; speeds in m/s, median / worst clock phase")
-    headings = ("K_R", "K_V", "powers of t_go", "thrust", "phase margin", "delay / t_go")
-    ends = ("stable above", "margins above", "speed left", "frozen: stable", "margins", "touchdown")
-    for heading in (*headings, *ends):
-        table.add_column(heading, justify="right")
-    for r in rows:
-        if r.power_imaginary > 0.0:
-            powers = f"{r.power_1_real:.2f}+-{r.power_imaginary:.2f}j"
-        else:
-            powers = f"{r.power_1_real:.2f}, {r.power_2_real:.2f}"
-        table.add_row(
-            f"{r.position_gain:g}",
-            f"{r.velocity_gain:g}",
-            powers,
-            "bounded" if r.thrust_bounded else "grows",
-            f"{r.phase_margin_deg:.1f} deg",
-            f"{r.delay_margin_over_time_to_go:.3f}",
-            f"{r.sampled_stable_above_s:.2f} s",
-            f"{r.margins_met_above_s:.2f} s",
-            f"{r.residual_speed_mps_median:.2f} / {r.residual_speed_mps_max:.2f}",
-            f"{r.frozen_at_stable_mps_median:.2f} / {r.frozen_at_stable_mps_max:.2f}",
-            f"{r.frozen_at_margins_mps_median:.2f} / {r.frozen_at_margins_mps_max:.2f}",
-            f"{r.touchdown_speed_mps_max:.1f}, {r.touchdown_time_to_go_s_max:.1f} s",
-        )
-    Console(width=max(Console().width, 160)).print(table)
-
-
 def study_stability(options: Stability) -> tuple[list[MarginRow], list[GainRow]]:
-    """Compute, write gains.csv, margins.csv, conclusions.txt and the figure, and print.
+    """Compute, write tables, conclusions.txt, provenance.json and the figure, and print.
 
     Raises:
         ValueError: an option is out of range or names something unknown.
@@ -120,15 +78,18 @@ def study_stability(options: Stability) -> tuple[list[MarginRow], list[GainRow]]
         for gains in track(box, "margins", transient=True)
         for time in times
     ]
-    write_rows(out / "gains.csv", gain_rows)
-    write_rows(out / "margins.csv", margin_rows)
+    write_csv(out / "gains.csv", field_columns(GainRow), gain_rows)
+    write_csv(out / "margins.csv", field_columns(MarginRow), margin_rows)
+    write_markdown(out / "gains.md", GAIN_COLUMNS, gain_rows)
+    write_provenance(out / "provenance.json", describe_run(options))
     words = conclude(margin_rows, gain_rows, preset, options.required)
     (out / "conclusions.txt").write_text("\n".join(words) + "\n")
     if options.figures:
         from studies.stability.picture import draw_stability
 
-        draw_stability(out / "stability.png", preset, options.required)
-    print_gains(gain_rows, preset)
+        draw_stability(preset, options.required).savefig(out / "stability.png", dpi=110)
+    title = f"ZEM/ZEV, control period {period:g} s; speeds in m/s, median / worst clock phase"
+    Console(width=max(Console().width, 176)).print(console_table(GAIN_COLUMNS, gain_rows, title))
     console = Console()
     for sentence in words:
         console.print(f"- {sentence}", markup=False, highlight=False)

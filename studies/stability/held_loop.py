@@ -26,6 +26,7 @@ import numpy as np
 from guidance.validation import finite_number
 
 _FREQUENCIES = 600
+_EDGE = 1e-13  # relative width to which a threshold is found
 
 
 @dataclass(frozen=True)
@@ -117,23 +118,25 @@ def least_safe_time(gains: Gains, period: float, phase_margin: float, gain_margi
     Raises:
         ValueError: the continuous loop itself lacks the phase margin.
     """
+    from scipy.optimize import root_scalar
+
     if closed_margins(gains, 1.0).phase_margin <= phase_margin:
         raise ValueError(
             f"phase_margin {math.degrees(phase_margin):g} deg is more than the gains "
             f"{gains.position:g}/{gains.velocity:g} have at any time to go"
         )
+
+    def spare(time: float) -> float:
+        """Above zero where both margins are kept."""
+        return 1.0 if sampled_margins(gains, time, period).meet(phase_margin, gain_margin) else -1.0
+
     low = high = period
-    while not sampled_margins(gains, high, period).meet(phase_margin, gain_margin):
+    while spare(high) < 0.0:
         low, high = high, 2.0 * high
-    while sampled_margins(gains, low, period).meet(phase_margin, gain_margin):
+    while spare(low) > 0.0:
         low *= 0.5
-    while high - low > 1e-12 * high:
-        middle = 0.5 * (low + high)
-        if sampled_margins(gains, middle, period).meet(phase_margin, gain_margin):
-            high = middle
-        else:
-            low = middle
-    return high
+    edge = root_scalar(spare, bracket=(low, high), method="bisect", xtol=1e-15 * high, rtol=_EDGE).root
+    return float(edge) * (1.0 + 2.0 * _EDGE)  # on the side that keeps them
 
 
 def stable_above(gains: Gains, period: float) -> float:

@@ -3,27 +3,27 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hda.flight.palette import COLORS
 from hda.task.presets import Preset
-from studies.compare.figures import COLORS
 from studies.stability.held_loop import Gains, closed_margins, least_safe_time, sampled_margins, stable_above
 from studies.stability.sampled_flight import flight_powers
 from studies.stability.sweep import POSITION_GAINS, VELOCITY_GAINS, Requirement, descend
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
 _SHOWN = (Gains(6.0, 2.0), Gains(5.0, 1.0), Gains(7.0, 1.0), Gains(5.0, 3.0), Gains(7.0, 3.0))
 _POINTS = 33
 
 
-def draw_stability(path: Path, preset: Preset, required: Requirement) -> None:
-    """Draw and save the figure."""
+def draw_stability(preset: Preset, required: Requirement) -> Figure:
+    """Draw the maps and the margins; the caller saves the figure."""
     from matplotlib.figure import Figure
 
     period = preset.rules.control_period
@@ -60,7 +60,7 @@ def draw_stability(path: Path, preset: Preset, required: Requirement) -> None:
         f"ZEM/ZEV, control period {period:g} s; margins: {math.degrees(required.phase_margin):g} deg and a "
         f"factor {required.gain_margin:g}; worst over the phase of the clock; no thrust limit"
     )
-    figure.savefig(path, dpi=110)
+    return figure
 
 
 def _draw_map(axis: Axes, values: NDArray[np.float64], title: str, levels: tuple[float, ...]) -> None:

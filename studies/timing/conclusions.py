@@ -11,11 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from studies.speed_ratios import FREE_TO_FIXED_LIMIT
+from studies.timing.gfold_peer import PEER_METHOD
 from studies.timing.measures import Call, Summary
-from studies.timing.methods import FATROP_METHOD, IPOPT_METHOD, PEER_NODES, Method
+from studies.timing.methods import FATROP_METHOD, IPOPT_METHOD, OWN_METHOD, PEER_NODES, Method
 
-FREE_TO_FIXED_BAR = 2.0
-"""Most that a free-time solve may cost, in fixed-time solves of the same nodes."""
 PEER_BAR = 100.0
 """Least factor by which solve_pdg should beat gfold's free-time solve at 30 nodes."""
 
@@ -56,18 +56,18 @@ def compare_methods(calls: Sequence[Call], first: str, second: str) -> Compariso
 def conclude(methods: Sequence[Method], calls: Sequence[Call], summaries: Sequence[Summary]) -> list[str]:
     """The bars in words, met or not, on the starts drawn from the preset."""
     starts = [call for call in calls if call.drawn]
-    ours = {(m.nodes, m.free): m.label for m in methods if m.name == "solve_pdg"}
+    ours = {(m.nodes, m.free): m.label for m in methods if m.name == OWN_METHOD}
     meshes = sorted({nodes for nodes, _ in ours}, reverse=True)
     words = []
     for nodes in meshes:
         found = compare_methods(starts, ours[nodes, True], ours[nodes, False])
-        met = "met" if found.ratio <= FREE_TO_FIXED_BAR else "NOT met"
+        met = "met" if found.ratio <= FREE_TO_FIXED_LIMIT else "NOT met"
         words.append(
             f"Drawn starts, solve_pdg at {nodes} nodes: a free-time solve costs {found.ratio:.2f} fixed-time "
-            f"solves (medians; {found.paired:.2f} case by case); bar {FREE_TO_FIXED_BAR:g}: {met}."
+            f"solves (medians; {found.paired:.2f} case by case); bar {FREE_TO_FIXED_LIMIT:g}: {met}."
         )
     words += _fatrop_against_ipopt(starts, {summary.method: summary for summary in summaries}, methods)
-    peers = [m for m in methods if m.name == "gfold" and m.free and m.nodes == PEER_NODES]
+    peers = [m for m in methods if m.name == PEER_METHOD and m.free and m.nodes == PEER_NODES]
     if not peers:
         words.append("gfold is not installed (extra `peers`): no comparison with it was made.")
     for peer in peers:

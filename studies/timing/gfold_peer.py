@@ -23,6 +23,8 @@ from guidance.descent.problem import LandingProblem
 from guidance.descent.trajectory import Trajectory
 from guidance.flight_time.time_window import time_window
 
+PEER_METHOD = "gfold"
+"""Its name in tables, and the package's."""
 FREE_TIME_SOLVES = 36
 """A sweep of 13 times, golden section with 2 + 20, and the last one: fixed in its source."""
 _LEAST_THRUST = 1e-3  # of the full thrust, where the lander can stop its engine
@@ -31,12 +33,12 @@ _FASTEST = 1e4  # [m/s] no speed limit
 
 def gfold_present() -> bool:
     """Whether the package is installed (optional extra `peers`)."""
-    return importlib.util.find_spec("gfold") is not None
+    return importlib.util.find_spec(PEER_METHOD) is not None
 
 
 def gfold_config(problem: LandingProblem, nodes: int, time_of_flight: float | None) -> Any:
     """The package's description of a problem; the flight lasts `time_of_flight` [s], None to search."""
-    gfold = importlib.import_module("gfold")
+    gfold = importlib.import_module(PEER_METHOD)
     lander, glide = problem.lander, problem.glide_slope_limit
     window = time_window(problem)
     stretch = nodes / (nodes - 1)
@@ -77,14 +79,14 @@ def plan_gfold(problem: LandingProblem, nodes: int, time_of_flight: float | None
     Raises:
         ImportError: the package is not installed.
     """
-    gfold = importlib.import_module("gfold")
+    gfold = importlib.import_module(PEER_METHOD)
     solves = FREE_TIME_SOLVES if time_of_flight is None else 1
     try:
         answer = gfold.solve(gfold_config(problem, nodes, time_of_flight))
     except ValueError as error:
         refused = "infeasible" in str(error).lower()  # its word; it gives no proof
         status = PlanStatus.INFEASIBLE if refused else PlanStatus.SOLVER_FAILED
-        return Plan(status, problem, "gfold", message=str(error), solves=solves)
+        return Plan(status, problem, PEER_METHOD, message=str(error), solves=solves)
     mass = np.exp(np.array(answer.z_values))
     flight = Trajectory(
         np.array(answer.time_points),
@@ -94,4 +96,4 @@ def plan_gfold(problem: LandingProblem, nodes: int, time_of_flight: float | None
         np.array(answer.u_values) * mass[:, None],
         problem.lander.exhaust_velocity,
     )
-    return Plan.of_flight(PlanStatus.OPTIMAL, problem, "gfold", flight, solves)
+    return Plan.of_flight(PlanStatus.OPTIMAL, problem, PEER_METHOD, flight, solves)

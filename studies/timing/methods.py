@@ -5,22 +5,28 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from guidance import InfeasibleError, Lander, Plan, SolverFailedError, State, solve_pdg
 from guidance.descent.problem import LandingProblem
-from guidance.pdg.solve import DEFAULT_NODES
+from guidance.pdg.solve import DEFAULT_NODES, METHODS, PlanningMethod
 from guidance.reference.casadi_planner import plan_casadi
 from guidance.reference.nonlinear_program import NonlinearSolver, fatrop_present
 from hda.task.scenario import sample_scenario
-from studies.timing.gfold_peer import gfold_present, plan_gfold
+from studies.timing.gfold_peer import PEER_METHOD, gfold_present, plan_gfold
+
+CONVEX, CASADI, CVXPY = METHODS
 
 PEER_NODES = 30
 _TIGHT_NODES = 201
-IPOPT_METHOD = "casadi, IPOPT alone"
-FATROP_METHOD = "casadi, fatrop alone"
+OWN_METHOD = "solve_pdg"
+DPP_METHOD = f"{CVXPY}, DPP"
+REBUILT_METHOD = f"{CVXPY}, rebuilt"
+IPOPT_METHOD = f"{CASADI}, IPOPT alone"
+FATROP_METHOD = f"{CASADI}, fatrop alone"
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +61,9 @@ class Case:
         )
 
 
-def ask(problem: LandingProblem, nodes: int, time_of_flight: float | None, method: str = "convex") -> Plan:
+def ask(
+    problem: LandingProblem, nodes: int, time_of_flight: float | None, method: PlanningMethod = CONVEX
+) -> Plan:
     """Call `solve_pdg` on a problem; a plan without a flight is returned, not raised."""
     try:
         return solve_pdg(
@@ -68,7 +76,7 @@ def ask(problem: LandingProblem, nodes: int, time_of_flight: float | None, metho
             target_velocity=problem.target_velocity,
             time_of_flight=time_of_flight,
             nodes=nodes,
-            method=method,  # type: ignore[arg-type]
+            method=method,
         )
     except (InfeasibleError, SolverFailedError) as error:
         return error.plan
@@ -148,8 +156,8 @@ class Method:
         return self.plan(case.problem, self.nodes, case.time_of_flight if fixed else None)
 
 
-def _by_casadi(problem: LandingProblem, nodes: int, time_of_flight: float | None) -> Plan:
-    return ask(problem, nodes, time_of_flight, "casadi")
+def _by_method(method: PlanningMethod) -> Callable[[LandingProblem, int, float | None], Plan]:
+    return partial(ask, method=method)
 
 
 def _by_one_solver(solver: NonlinearSolver) -> Callable[[LandingProblem, int, float | None], Plan]:
@@ -157,10 +165,6 @@ def _by_one_solver(solver: NonlinearSolver) -> Callable[[LandingProblem, int, fl
         return plan_casadi(problem, nodes, time_of_flight, solver=solver)
 
     return plan
-
-
-def _by_cvxpy(problem: LandingProblem, nodes: int, time_of_flight: float | None) -> Plan:
-    return ask(problem, nodes, time_of_flight, "cvxpy")
 
 
 def _forget_cvxpy_model() -> None:
@@ -172,17 +176,16 @@ def _forget_cvxpy_model() -> None:
 
 def timed_methods() -> list[Method]:
     """Every method that is installed; the first of them is solve_pdg as users call it."""
-    methods = [
-        Method("solve_pdg", nodes, free, ask) for nodes in (DEFAULT_NODES, 31) for free in (True, False)
-    ]
-    methods += [Method("cvxpy, DPP", DEFAULT_NODES, free, _by_cvxpy) for free in (True, False)]
-    methods.append(Method("cvxpy, rebuilt", DEFAULT_NODES, False, _by_cvxpy, _forget_cvxpy_model))
-    methods += [Method("casadi", DEFAULT_NODES, free, _by_casadi) for free in (True, False)]
-    methods += [Method(IPOPT_METHOD, DEFAULT_NODES, free, _by_one_solver("ipopt")) for free in (True, False)]
+    cvxpy, casadi, both = _by_method(CVXPY), _by_method(CASADI), (True, False)
+    methods = [Method(OWN_METHOD, nodes, free, ask) for nodes in (DEFAULT_NODES, 31) for free in both]
+    methods += [Method(DPP_METHOD, DEFAULT_NODES, free, cvxpy) for free in both]
+    methods.append(Method(REBUILT_METHOD, DEFAULT_NODES, False, cvxpy, _forget_cvxpy_model))
+    methods += [Method(CASADI, DEFAULT_NODES, free, casadi) for free in both]
+    methods += [Method(IPOPT_METHOD, DEFAULT_NODES, free, _by_one_solver("ipopt")) for free in both]
     if fatrop_present():
         alone = _by_one_solver("fatrop")
-        methods += [Method(FATROP_METHOD, DEFAULT_NODES, free, alone) for free in (True, False)]
+        methods += [Method(FATROP_METHOD, DEFAULT_NODES, free, alone) for free in both]
     if gfold_present():
-        methods += [Method("gfold", PEER_NODES, free, plan_gfold) for free in (True, False)]
-        methods.append(Method("gfold", DEFAULT_NODES, True, plan_gfold))
+        methods += [Method(PEER_METHOD, PEER_NODES, free, plan_gfold) for free in both]
+        methods.append(Method(PEER_METHOD, DEFAULT_NODES, True, plan_gfold))
     return methods

@@ -2,7 +2,7 @@
 
 Policies fly the validation tiles. The weights of hazard-aware's objective are varied one at a time on the
 tuning tiles, as changing them is tuning. The front holds the policies that see no truth and that no other of
-them beats in both. The ceiling and the floor are `hindsight`'s: the share of episodes in which any policy
+them beats in both. The ceiling and the floor are `hindsight`'s: the ratio of episodes in which any policy
 could have known safe ground, and the propellant without which none can land there softly.
 """
 
@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
 import tyro
 from rich.console import Console
 from rich.progress import track
@@ -26,19 +25,14 @@ from hda.task.presets import Preset, find_preset
 from hda.task.scenario import sample_scenario
 from studies.campaign.command_line import choose_policies, open_folder, resumable
 from studies.campaign.monte_carlo import Study
-from studies.campaign.point_score import score_rows
 from studies.campaign.points import Point, Rows, fly_points
-from studies.campaign.provenance import describe_study, write_provenance
+from studies.campaign.provenance import describe_run, write_provenance
 from studies.campaign.run_options import RunOptions
-from studies.statistics.ratios import bootstrap_mean, wilson_interval
-from studies.trade_off.table import (
-    Bounds,
-    TradeOffRow,
-    print_trade_off,
-    write_bounds,
-    write_markdown,
-    write_rows,
-)
+from studies.campaign.score import score_rows
+from studies.columns import write_csv, write_markdown
+from studies.statistics.moments import collect_moments, mean_intervals
+from studies.statistics.ratios import wilson_interval
+from studies.trade_off.table import BOUNDS_COLUMNS, COLUMNS, Bounds, TradeOffRow, print_trade_off
 from studies.trade_off.weights import SWEEP, sweep_name, sweep_path
 
 BASE = "hazard-aware"
@@ -111,7 +105,7 @@ def score_point(study: Study, rows: Rows) -> list[TradeOffRow]:
     scored = []
     for name in study.policies:
         weight, value = changed.get(name, ("", float("nan")))
-        score = score_rows(rows[name], study.study_seed)
+        score = score_rows(rows[name])
         privileged = policy_entry(name).privileged
         scored.append(TradeOffRow(study.preset.name, study.split, name, weight, value, privileged, score))
     front = find_front(scored)
@@ -136,12 +130,13 @@ def find_front(rows: Sequence[TradeOffRow]) -> set[str]:
 
 def bound_preset(preset: Preset, options: TradeOff) -> Bounds:
     """Ceiling and floor over the episodes that the policies flew."""
-    known, least = [], []
+    known, least, tiles = [], [], []
     for episode in track(range(options.episodes), f"bounds, {preset.name}", transient=True):
         scenario = sample_scenario(preset, options.study_seed, episode, options.split)
         known.append(could_have_landed(scenario))
         least.append(100.0 * least_propellant(scenario))
-    floor = bootstrap_mean(least, np.random.default_rng([options.study_seed, 0]))
+        tiles.append(scenario.tile.number)
+    floor, _ = mean_intervals(collect_moments(least, tiles), 0)
     return Bounds(preset.name, len(known), wilson_interval(sum(known), len(known)), floor)
 
 
@@ -158,15 +153,14 @@ def run_trade_off(options: TradeOff) -> tuple[list[TradeOffRow], list[Bounds]]:
     flown = fly_points(out, points, options.existing, options.workers)
     rows = [row for point in points for row in score_point(point.study, flown[point.label])]
     bounds = [bound_preset(find_preset(name), options) for name in options.presets]
-    write_rows(out / "table.csv", rows)
-    write_markdown(out / "table.md", rows)
-    write_bounds(out / "bounds.csv", bounds)
+    write_csv(out / "table.csv", COLUMNS, rows)
+    write_markdown(out / "table.md", COLUMNS, rows)
+    write_csv(out / "bounds.csv", BOUNDS_COLUMNS, bounds)
     if options.figures:
         from studies.trade_off.picture import draw_trade_off
 
-        draw_trade_off(out / "trade-off.png", rows, bounds)
-    labels = [point.label for point in points]
-    write_provenance(out / "provenance.json", describe_study(points[0].study, {"points": labels}))
+        draw_trade_off(rows, bounds).savefig(out / "trade-off.png", dpi=85)
+    write_provenance(out / "provenance.json", describe_run(options))
     return rows, bounds
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,13 +11,14 @@ from studies.compare.figures import COLORS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
     from studies.trade_off.table import Bounds, TradeOffRow
 
 _MARKERS = ("o", "s", "D", "^", "v", "P", "X")
 
 
-def draw_trade_off(path: Path, rows: Sequence[TradeOffRow], bounds: Sequence[Bounds]) -> None:
+def draw_trade_off(rows: Sequence[TradeOffRow], bounds: Sequence[Bounds]) -> Figure:
     """Draw a column per preset: the policies above, the sweeps of the weights below."""
     from matplotlib.figure import Figure
 
@@ -40,7 +40,7 @@ def draw_trade_off(path: Path, rows: Sequence[TradeOffRow], bounds: Sequence[Bou
     for row in axes:
         handles, labels = row[-1].get_legend_handles_labels()
         row[-1].legend(handles, labels, loc="center left", bbox_to_anchor=(1.02, 0.5), frameon=False)
-    figure.savefig(path, dpi=85)
+    return figure
 
 
 def _ends(row: TradeOffRow) -> tuple[list[float], list[float], list[float]]:
@@ -104,6 +104,6 @@ def _draw_weights(axis: Axes, rows: Sequence[TradeOffRow], start: TradeOffRow | 
 
 
 def _label(axis: Axes) -> None:
-    axis.set_xlabel("propellant burnt [%], mean with bootstrap interval")
+    axis.set_xlabel("propellant burnt [%], mean with Student's interval")
     axis.set_ylabel("safe site [%], Wilson's interval, thin: by tile")
     axis.grid(alpha=0.25)

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
-import numpy as np
 from rich.console import Console
-from rich.table import Table
 
-from studies.campaign.point_score import SCORE_COLUMNS, PointScore
+from studies.campaign.score import PROPELLANT_COLUMN, RATIO_COLUMNS, Score, scaled
+from studies.columns import Column, Output, console_table
 from studies.statistics.ratios import Interval
 
 
@@ -26,7 +23,7 @@ class TradeOffRow:
         weight: weight that was changed; empty for a registered policy.
         value: of that weight; nan for a registered policy.
         privileged: it sees the true map.
-        score: ratios and propellant with their intervals.
+        score: every figure with its intervals.
         on_front: no policy of the same preset and split that sees no truth beats it in both.
     """
 
@@ -36,7 +33,7 @@ class TradeOffRow:
     weight: str
     value: float
     privileged: bool
-    score: PointScore
+    score: Score
     on_front: bool = False
 
 
@@ -47,8 +44,8 @@ class Bounds:
     Attributes:
         preset: name.
         episodes: number of episodes.
-        ceiling: share of episodes in which safe ground could have been known, with Wilson's interval.
-        floor: mean least propellant [%] with its bootstrap interval.
+        ceiling: ratio of episodes in which safe ground could have been known, with Wilson's interval.
+        floor: mean least propellant [%] with Student's interval.
     """
 
     preset: str
@@ -57,61 +54,35 @@ class Bounds:
     floor: Interval
 
 
-def write_rows(path: Path, rows: Sequence[TradeOffRow]) -> None:
-    """Write every point as CSV; ratios and propellant in percent."""
-    header = ["preset", "split", "policy", "weight", "value", "privileged", "on_front", "episodes"]
-    with path.open("w", newline="") as stream:
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow([*header, *SCORE_COLUMNS])
-        for row in rows:
-            value = "" if np.isnan(row.value) else f"{row.value:g}"
-            cells = [row.preset, row.split, row.policy, row.weight, value, row.privileged, row.on_front]
-            writer.writerow([*cells, row.score.episodes, *row.score.cells()])
+def _mark(row: TradeOffRow) -> str:
+    return " *" if row.privileged else ""
 
 
-def _cells(row: TradeOffRow) -> list[str]:
-    safe, tiled, burnt = row.score.safe_site, row.score.safe_site_by_tile, row.score.propellant
-    ends = (safe.estimate, safe.low, safe.high, tiled.low, tiled.high)
-    return [
-        row.policy + (" *" if row.privileged else ""),
-        "{:.1f} ({:.1f}-{:.1f}) [{:.1f}-{:.1f}]".format(*(100.0 * value for value in ends)),
-        f"{100.0 * row.score.success.estimate:.1f}",
-        f"{burnt.estimate:.2f} ({burnt.low:.2f}-{burnt.high:.2f})",
-        "yes" if row.on_front else "",
-    ]
+COLUMNS: tuple[Column[TradeOffRow], ...] = (
+    Column("preset", "preset", lambda row: row.preset, words=True),
+    Column("split", "tiles", lambda row: row.split, words=True),
+    Column("policy", "policy", lambda row: row.policy, mark=_mark, words=True),
+    Column("weight", "weight", lambda row: row.weight, outputs=Output.FILE),
+    Column("value", "value", lambda row: row.value, outputs=Output.FILE),
+    Column("privileged", "privileged", lambda row: row.privileged, outputs=Output.FILE),
+    Column("episodes", "episodes", lambda row: row.score.episodes, outputs=Output.FILE),
+    *(column.through(lambda row: row.score) for column in (*RATIO_COLUMNS, PROPELLANT_COLUMN)),
+    Column("on_front", "front", lambda row: row.on_front, form=lambda on: "yes" if on else ""),
+)
+"""The points: table.csv, table.md and the console read this list."""
 
-
-_HEADINGS = ("preset", "tiles", "policy", "safe site %", "success %", "propellant %", "front")
-
-
-def write_markdown(path: Path, rows: Sequence[TradeOffRow]) -> None:
-    """Write the points for a document."""
-    lines = ["| " + " | ".join(_HEADINGS) + " |", "|---|---|---|---:|---:|---:|---|"]
-    lines += ["| " + " | ".join([row.preset, row.split, *_cells(row)]) + " |" for row in rows]
-    path.write_text("\n".join(lines) + "\n")
-
-
-def write_bounds(path: Path, bounds: Sequence[Bounds]) -> None:
-    """Write ceilings and floors as CSV, in percent."""
-    with path.open("w", newline="") as stream:
-        writer = csv.writer(stream, lineterminator="\n")
-        names = [
-            f"{name}{end}" for name in ("ceiling_percent", "floor_percent") for end in ("", "_low", "_high")
-        ]
-        writer.writerow(["preset", "episodes", *names])
-        for b in bounds:
-            top = [100.0 * value for value in (b.ceiling.estimate, b.ceiling.low, b.ceiling.high)]
-            ends = (*top, b.floor.estimate, b.floor.low, b.floor.high)
-            writer.writerow([b.preset, b.episodes, *(f"{value:.9g}" for value in ends)])
+BOUNDS_COLUMNS: tuple[Column[Bounds], ...] = (
+    Column("preset", "preset", lambda bounds: bounds.preset),
+    Column("episodes", "episodes", lambda bounds: bounds.episodes),
+    Column("ceiling_percent", "ceiling", lambda bounds: scaled(bounds.ceiling, 100.0), interval=True),
+    Column("floor_percent", "floor", lambda bounds: bounds.floor, interval=True),
+)
+"""Ceilings and floors in percent, as bounds.csv has them."""
 
 
 def print_trade_off(rows: Sequence[TradeOffRow], bounds: Sequence[Bounds]) -> None:
     """Print the points and the bounds."""
-    table = Table(title="safe landings against propellant", caption="* sees the true map")
-    for heading in _HEADINGS:
-        table.add_column(heading, no_wrap=heading == "policy")
-    for row in rows:
-        table.add_row(row.preset, row.split, *(cell.replace("[", "\\[") for cell in _cells(row)))
+    table = console_table(COLUMNS, rows, "safe landings against propellant", "* sees the true map")
     console = Console(width=max(Console().width, 130))
     console.print(table)
     for b in bounds:

@@ -46,7 +46,7 @@ def scenarios() -> list[Scenario]:
 def pilot(name: str, scenario: Scenario) -> Policy[Any]:
     """The policy as `fly` calls it."""
     policy = hda.make_policy(name)
-    return policy.informed(scenario.tile) if isinstance(policy, PrivilegedPolicy) else policy
+    return policy.informed(scenario) if isinstance(policy, PrivilegedPolicy) else policy
 
 
 class Journey:
@@ -164,7 +164,7 @@ def test_two_episodes_in_turns_are_the_same_as_one_after_the_other(name, scenari
     pair = scenarios[2:4]
     records = [fly(policy, scenario) for scenario in pair]
     if isinstance(policy, PrivilegedPolicy):
-        journeys = [Journey(policy.informed(scenario.tile), scenario) for scenario in pair]
+        journeys = [Journey(policy.informed(scenario), scenario) for scenario in pair]
     else:
         journeys = [Journey(policy, scenario) for scenario in pair]
     while not all(journey.over for journey in journeys):

@@ -5,28 +5,26 @@ import sys
 import pytest
 
 REPORT = """
-import json, sys, time
-start = time.perf_counter()
+import json, sys
 import guidance
-seconds = time.perf_counter() - start
 before = sorted(sys.modules)
 {use}
-print(json.dumps([seconds, before, sorted(sys.modules)]))
+print(json.dumps([before, sorted(sys.modules)]))
 """
 
 
-def import_guidance(use: str = "") -> tuple[float, set[str], set[str]]:
-    """In a fresh process: seconds, modules after the import, modules after `use`."""
+def import_guidance(use: str = "") -> tuple[set[str], set[str]]:
+    """In a fresh process: modules after the import, and after `use`."""
     answer = subprocess.run(
         [sys.executable, "-c", REPORT.format(use=use)], capture_output=True, text=True, check=True
     )
-    seconds, before, after = json.loads(answer.stdout)
-    return seconds, set(before), set(after)
+    before, after = json.loads(answer.stdout)
+    return set(before), set(after)
 
 
-def test_import_is_quick_and_light():
-    seconds, modules, _ = min((import_guidance() for _ in range(3)), key=lambda report: report[0])
-    assert seconds < 0.5
+def test_import_is_light():
+    """What it costs stands among the ratios of `python -m studies.bench`."""
+    modules, _ = import_guidance()
     heavy = {
         "numba",
         "scipy",
@@ -45,7 +43,7 @@ def test_import_is_quick_and_light():
 
 @pytest.mark.parametrize("use", ["guidance.Lander()", "guidance.State([0, 0, 0], [0, 0, 0], 1)"])
 def test_a_vehicle_needs_no_compiler(use):
-    _, _, modules = import_guidance(use)
+    _, modules = import_guidance(use)
     assert "guidance.lander" in modules or "guidance.state" in modules
     assert not {"numba", "scipy", "torch"} & modules
 

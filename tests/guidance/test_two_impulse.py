@@ -1,6 +1,5 @@
 """The cheap estimate of a landing's propellant: closed forms, a slow search, and `solve_pdg`."""
 
-import itertools
 import math
 
 import numpy as np

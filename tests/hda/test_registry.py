@@ -9,25 +9,23 @@ import pytest
 
 import hda
 from hda import registry
+from hda.policies.catalogue import ENTRIES
 from hda.policies.composition import ComposedPolicy, PrivilegedComposition
 from hda.policies.entry import PolicyEntry
 from hda.policies.privileged.oracle import OracleSite
 from hda.policies.zem_zev import FixedGainZemZev
 from hda.policy import PrivilegedPolicy
-from hda.registry import policy_entry
+from hda.registry import PolicyRegistry, policy_entry
 from hda.site_selection import NominalSite
 from studies.campaign.command_line import choose_policies
 
-
-@pytest.fixture(autouse=True)
-def _own_registry(monkeypatch):
-    """A copy to write in, with this package's policies alone."""
-    hda.policy_names()
-    own = {name: entry for name, entry in registry._entries.items() if name in OWN}
-    monkeypatch.setattr(registry, "_entries", own)
-
-
 OWN = ("no-divert", "single-divert", "nearest-safe", "oracle")
+
+
+@pytest.fixture
+def policies() -> PolicyRegistry:
+    """A registry of this package's policies that need no learning, which nobody else asks."""
+    return PolicyRegistry(lambda: tuple(entry for entry in ENTRIES if entry.name in OWN))
 
 
 def nominal(name: str) -> ComposedPolicy:
@@ -35,18 +33,18 @@ def nominal(name: str) -> ComposedPolicy:
 
 
 def privileged(name: str) -> PrivilegedComposition:
-    return PrivilegedComposition(name, OracleSite, FixedGainZemZev())
+    return PrivilegedComposition(name, OracleSite.informed, FixedGainZemZev())
 
 
-def test_the_policies_that_need_no_learning_are_registered():
-    assert set(OWN) <= set(hda.policy_names())
+def test_the_policies_that_need_no_learning_are_registered(policies):
+    assert set(OWN) <= set(policies.names())
 
 
-def test_a_made_policy_carries_its_name():
-    for name in hda.policy_names():
-        assert hda.make_policy(name).name == name
-        assert policy_entry(name).name == name
-        assert policy_entry(name).summary
+def test_a_made_policy_carries_its_name(policies):
+    for name in policies.names():
+        assert policies.make(name).name == name
+        assert policies.entry(name).name == name
+        assert policies.entry(name).summary
 
 
 @pytest.mark.parametrize(
@@ -58,11 +56,11 @@ def test_a_made_policy_carries_its_name():
         ("No-Divert", "no-divert"),
     ],
 )
-def test_an_unknown_name_suggests_the_nearest(wrong, meant):
+def test_an_unknown_name_suggests_the_nearest(wrong, meant, policies):
     with pytest.raises(ValueError, match=rf"unknown policy '{wrong}'; did you mean .*{meant}"):
-        hda.make_policy(wrong)
+        policies.make(wrong)
     with pytest.raises(ValueError, match=r"valid: .*single-divert"):
-        policy_entry(wrong)
+        policies.entry(wrong)
 
 
 def without_rl(name: str) -> str:
@@ -91,54 +89,78 @@ def test_the_names_of_agents_are_those_that_rl_registers():
 
 
 @pytest.mark.parametrize("wrong", ["", "xyzzy", 7, None])
-def test_a_name_like_no_other_gets_the_whole_list(wrong: Any):
+def test_a_name_like_no_other_gets_the_whole_list(wrong: Any, policies):
     with pytest.raises(ValueError, match=r"unknown policy .*\(valid: .*no-divert.*\)"):
-        hda.make_policy(wrong)
+        policies.make(wrong)
 
 
-def test_a_registered_policy_can_be_made_and_comes_last():
-    hda.register_policy(PolicyEntry("mine", lambda: nominal("mine"), "a policy of one's own"))
-    assert hda.policy_names()[-1] == "mine"
-    assert hda.make_policy("mine").name == "mine"
-    assert hda.make_policy("mine") is not hda.make_policy("mine")
+def test_a_registered_policy_can_be_made_and_comes_last(policies):
+    policies.register(PolicyEntry("mine", lambda: nominal("mine"), "a policy of one's own"))
+    assert policies.names()[-1] == "mine"
+    assert policies.make("mine").name == "mine"
+    assert policies.make("mine") is not policies.make("mine")
 
 
-def test_a_name_is_registered_once():
+def test_a_name_is_registered_once(policies):
     with pytest.raises(ValueError, match="'oracle' is registered already"):
-        hda.register_policy(PolicyEntry("oracle", lambda: privileged("oracle"), "again", privileged=True))
+        policies.register(PolicyEntry("oracle", lambda: privileged("oracle"), "again", privileged=True))
     entry = PolicyEntry("mine", lambda: nominal("mine"), "once")
-    hda.register_policy(entry)
+    policies.register(entry)
     with pytest.raises(ValueError, match="'mine' is registered already"):
-        hda.register_policy(entry)
+        policies.register(entry)
 
 
-def test_a_policy_that_calls_itself_otherwise_is_refused():
+def test_a_policy_that_calls_itself_otherwise_is_refused(policies):
     with pytest.raises(ValueError, match="entry 'mine' makes a policy that calls itself 'other'"):
-        hda.register_policy(PolicyEntry("mine", lambda: nominal("other"), "two names"))
-    assert "mine" not in hda.policy_names()
+        policies.register(PolicyEntry("mine", lambda: nominal("other"), "two names"))
+    assert "mine" not in policies.names()
 
 
 @pytest.mark.parametrize("claim", [True, False])
-def test_privilege_must_be_told_as_it_is(claim):
+def test_privilege_must_be_told_as_it_is(claim, policies):
     make = nominal if claim else privileged
     with pytest.raises(ValueError, match="must say whether its policy is privileged"):
-        hda.register_policy(PolicyEntry("mine", lambda: make("mine"), "not honest", privileged=claim))
-    assert "mine" not in hda.policy_names()
+        policies.register(PolicyEntry("mine", lambda: make("mine"), "not honest", privileged=claim))
+    assert "mine" not in policies.names()
 
 
-def test_the_privileged_flag_of_every_entry_is_honest():
-    for name in hda.policy_names():
-        assert policy_entry(name).privileged == isinstance(hda.make_policy(name), PrivilegedPolicy)
-    assert [name for name in OWN if policy_entry(name).privileged] == ["oracle"]
+def test_the_privileged_flag_of_every_entry_is_honest(policies):
+    for name in policies.names():
+        assert policies.entry(name).privileged == isinstance(policies.make(name), PrivilegedPolicy)
+    assert [name for name in OWN if policies.entry(name).privileged] == ["oracle"]
 
 
-def test_a_policy_made_for_a_preset_belongs_there_alone():
+def test_a_policy_made_for_a_preset_belongs_there_alone(monkeypatch):
     entry = PolicyEntry("mine", lambda: nominal("mine"), "trained on hard ground", preset="hard")
     assert entry.belongs_on("hard")
     assert not entry.belongs_on("paper")
     assert not replace(entry, slow=True).belongs_on("hard")
     assert all(policy_entry(name).belongs_on(preset) for name in OWN for preset in hda.PRESETS)
+    monkeypatch.setattr(registry, "REGISTRY", registry.REGISTRY.copy())
     hda.register_policy(entry)
     assert "mine" in choose_policies(("default",), "hard")[0]
     assert "mine" not in choose_policies(("default",), "paper")[0]
     assert choose_policies(("mine",), "paper")[0] == ("mine",)
+
+
+def test_registries_know_nothing_of_one_another(policies):
+    other = policies.copy()
+    other.register(PolicyEntry("mine", lambda: nominal("mine"), "a policy of one's own"))
+    assert other.names() == (*policies.names(), "mine")
+    assert "mine" not in hda.policy_names()
+    again = other.copy()
+    assert again.names() == other.names()
+    assert PolicyRegistry(lambda: ()).names() == ()
+
+
+def test_a_registry_asks_for_its_first_entries_when_it_is_asked():
+    asked = []
+
+    def first():
+        asked.append(True)
+        return [PolicyEntry("mine", lambda: nominal("mine"), "a policy of one's own")]
+
+    late = PolicyRegistry(first)
+    assert not asked
+    assert late.names() == late.copy().names() == ("mine",)
+    assert len(asked) == 1

@@ -1,6 +1,7 @@
 """Failed episodes: what a look read is what the sensor gave, and causes follow from it."""
 
 import csv
+import json
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -130,6 +131,7 @@ def test_every_failed_episode_is_shown(flown: Path) -> None:
     text = (folder / "failures.md").read_text()
     assert f"{len(failed)} failed, the first 2 shown" in text
     assert len((folder / "failures.csv").read_text().splitlines()) == 3
+    assert json.loads((folder / "provenance.json").read_text())["options"]["most"] == 2
 
 
 def test_a_wrong_folder_or_policy_is_named(flown: Path, tmp_path: Path) -> None:

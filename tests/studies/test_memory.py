@@ -123,22 +123,43 @@ def test_scores_on_disk_come_back(tmp_path):
 def test_cards_give_a_score_per_seed(tmp_path):
     validation = {"episodes": 1000, "safe_site_percent": 90.0, "success_percent": 80.0, "reward": 0.4}
     training = {
-        "command": "python -m rl.train td3 --seed 1 --preset paper --steps 270000",
+        "recipe": "td3",
+        "planned_steps": 270000,
         "settings": {"algorithm": "td3"},
         "preset": "paper",
         "seeds": [{"seed": s, "steps": [10, 20], "validation": validation} for s in (0, 1)],
     }
-    path = tmp_path / "td3.json"
+    path = tmp_path / "of-any-name.json"
     path.write_text(json.dumps({"training": training}))
     first, second = scores_of_card(path)
     assert (first.agent, first.seed, second.seed, first.chosen_steps) == ("td3", 0, 1, "10+20")
     assert first.safe_site_percent == 90.0
-    assert not first.unfinished
+    assert (first.trained_steps, first.unfinished) == (270000, False)
     with pytest.raises(ValueError, match="both td3 on paper, seed 0"):
         collect_scores((path, path), tmp_path / "scores.csv", 1000, Choice())
     path.write_text("{}")
     with pytest.raises(ValueError, match="not a card"):
         scores_of_card(path)
+
+
+SHIPPED = sorted(card for card in WEIGHTS_FOLDER.glob("*.json") if card.stem != "autoencoder")
+
+
+@pytest.mark.parametrize("card", SHIPPED, ids=lambda card: card.stem)
+def test_shipped_cards_say_what_they_were_trained_with(card):
+    """The first cards have no field for it; the command in them, for people, says the same."""
+    training = json.loads(card.read_text())["training"]
+    words = training["command"].split()
+    steps = int(words[words.index("--steps") + 1])
+    for one in scores_of_card(card):
+        assert one.agent == words[words.index("rl.train") + 1]
+        assert steps - steps % 10_000 <= one.trained_steps <= steps
+
+
+def test_an_old_card_of_another_name_is_refused(tmp_path):
+    shutil.copy(WEIGHTS_FOLDER / "td3.json", tmp_path / "mine.json")
+    with pytest.raises(ValueError, match="does not name its recipe"):
+        scores_of_card(tmp_path / "mine.json")
 
 
 # Tiny runs
@@ -197,6 +218,9 @@ def test_runs_are_flown_compared_and_drawn(root, tmp_path, capsys):
         - np.mean([s.safe_site_percent for s in scores[:2]]),
         abs=1e-4,
     )
+    told = json.loads((tmp_path / "provenance.json").read_text())
+    assert len(told["sources"]) == 4
+    assert told["options"]["validation_episodes"] == 3
     assert "| paper | td3-lstm | safe site | 2 |" in (tmp_path / "memory.md").read_text()
     assert (tmp_path / "memory.png").stat().st_size > 5000
     assert re.search(r"On paper, .*td3-lstm.* points of safe", capsys.readouterr().out)

@@ -14,7 +14,7 @@ import pytest
 
 import hda
 from hda import registry
-from hda.registry import policy_entry
+from hda.registry import ENTRY_POINT_GROUP, PolicyRegistry, policy_entry
 from hda.task.presets import PRESETS
 from studies.campaign.study_folder import FolderError
 from studies.compare.command import Comparison, compare, plan_study
@@ -123,9 +123,7 @@ class Oracle(Straight):
 def module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
     """A user's file beside the command, and a registry that forgets it afterwards."""
     hda.policy_names()
-    monkeypatch.setattr(registry, "_entries", dict(registry._entries))
-    monkeypatch.setattr(registry, "_paths", {})
-    monkeypatch.setattr(registry, "_plugins_read", list(registry._plugins_read))
+    monkeypatch.setattr(registry, "REGISTRY", registry.REGISTRY.copy())
     name = f"own_{random.randrange(10**9)}"
     (tmp_path / f"{name}.py").write_text(GOOD)
     (tmp_path / f"{name}_bad.py").write_text(BAD.format(module=name))
@@ -230,14 +228,14 @@ def test_entry_points_are_read_and_a_broken_one_is_left_out(module: str, tmp_pat
     (info / "entry_points.txt").write_text(
         f"[lunar_hda.policies]\nstraight = {module}:Straight\nbroken = {module}_error:X\n"
     )
-    registry._plugins_read.clear()
     importlib.invalidate_caches()
+    policies = PolicyRegistry(lambda: (), ENTRY_POINT_GROUP)
     with pytest.warns(RuntimeWarning, match="entry point 'broken' of plugin is left out"):
-        names = hda.policy_names()
-    assert names[-1] == "straight"
+        names = policies.names()
+    assert names == ("straight",)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        assert hda.make_policy("straight").name == "straight"
+        assert policies.make("straight").name == "straight"
 
 
 def test_the_example_lands_and_is_short(monkeypatch: pytest.MonkeyPatch) -> None:

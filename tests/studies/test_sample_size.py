@@ -1,7 +1,10 @@
 """The planner's power is that of the test that the table prints."""
 
+import csv
+import json
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -76,8 +79,16 @@ def test_a_wrong_option_is_named(options: SampleSize, message: str) -> None:
         plan_comparison(options)
 
 
-def test_the_command_prints_both_tables() -> None:
+def test_the_command_prints_and_keeps_both_tables(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "studies.sample_size", "--difference", "1", "--power", "0.9"]
+    command += ["--out", str(tmp_path)]
     ended = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
     assert "power of 0.9" in ended.stdout
     assert "852" in ended.stdout
+    with (tmp_path / "demonstration.csv").open() as stream:
+        assert {row["failures_0"] for row in csv.DictReader(stream)} == {"45", "230", "852", "1705"}
+    with (tmp_path / "comparison.csv").open() as stream:
+        plans = list(csv.DictReader(stream))
+    assert len(plans) == 3
+    assert all(float(plan["power"]) >= 0.9 for plan in plans)
+    assert json.loads((tmp_path / "provenance.json").read_text())["options"]["power"] == 0.9

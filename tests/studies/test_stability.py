@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from guidance import MOON_GRAVITY, Lander, State, zem_zev_acceleration
-from hda.flight.vehicle import FlightErrors, FlightStatus, fly_interval
+from hda.flight.vehicle import ControlPeriods, FlightErrors, FlightStatus, fly_interval
 from hda.policy import Decision, DecisionStatus, ZemZevCommand
 from hda.task.presets import PRESETS
 from studies.stability.command import Stability, study_stability
@@ -199,7 +199,7 @@ def test_sampled_flight_against_the_vehicle(gains: Gains, time: float) -> None:
         Decision(site, command, DecisionStatus.NOMINAL),
         lander,
         gravity,
-        (PERIOD, clock.periods),
+        ControlPeriods(PERIOD, clock.periods),
         FlightErrors(),
     )
     nodes = flown.path.shape[0] - 1 if flown.status != FlightStatus.FLYING else clock.periods + 1
@@ -226,7 +226,7 @@ def test_mean_descent_touches_down_as_the_vehicle_does(gains: Gains) -> None:
             Decision(np.zeros(3), command, DecisionStatus.NOMINAL),
             preset.lander,
             gravity,
-            (PERIOD, clock.periods + 1),
+            ControlPeriods(PERIOD, clock.periods + 1),
             FlightErrors(),
         )
         assert flown.status == FlightStatus.TOUCHDOWN

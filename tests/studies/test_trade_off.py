@@ -1,6 +1,7 @@
 """The trade-off study: the front, the sweep of the weights, the files."""
 
 import csv
+import json
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,8 @@ from hda.policies.hazard_aware import HazardAwareSite
 from hda.policies.site_price import HazardAwareWeights
 from hda.registry import make_policy
 from hda.task.scenario import sample_scenario
-from studies.campaign.point_score import PointScore
+from studies.campaign.rows import MEASURES
+from studies.campaign.score import Score
 from studies.statistics.ratios import Interval
 from studies.trade_off.command import TradeOff, find_front, plan_points, run_trade_off
 from studies.trade_off.table import TradeOffRow
@@ -25,13 +27,23 @@ from studies.trade_off.weights import SWEEP, change_weight, sweep_name, sweep_pa
 @pytest.fixture(autouse=True)
 def forgetful_registry(monkeypatch: pytest.MonkeyPatch) -> None:
     hda.policy_names()
-    monkeypatch.setattr(registry, "_entries", dict(registry._entries))
-    monkeypatch.setattr(registry, "_paths", {})
+    monkeypatch.setattr(registry, "REGISTRY", registry.REGISTRY.copy())
 
 
 def row(name: str, safe: float, burnt: float, privileged: bool = False) -> TradeOffRow:
     ratio = Interval(safe, safe, safe)
-    score = PointScore(100, ratio, ratio, ratio, ratio, Interval(burnt, burnt, burnt))
+    means: dict[str, Interval] = {name: Interval(burnt, burnt, burnt) for name in MEASURES}
+    score = Score(
+        episodes=100,
+        safe_site=ratio,
+        safe_site_by_tile=ratio,
+        success=ratio,
+        success_by_tile=ratio,
+        success_at_least=safe,
+        means=means,
+        means_by_tile=means,
+        fallbacks=0,
+    )
     return TradeOffRow("paper", "validation", name, "", float("nan"), privileged, score)
 
 
@@ -74,23 +86,20 @@ def test_a_wrong_weight_is_no_policy(path: str) -> None:
 @pytest.fixture(scope="module")
 def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
     hda.policy_names()
-    kept = dict(registry._entries), dict(registry._paths)
     folder = tmp_path_factory.mktemp("trade_off")
-    run_trade_off(
-        TradeOff(
-            presets=("paper",),
-            policies=("no-divert", "single-divert", "oracle"),
-            weights=("commit_time",),
-            episodes=10,
-            sweep_episodes=2,
-            workers=1,
-            out=folder,
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(registry, "REGISTRY", registry.REGISTRY.copy())
+        run_trade_off(
+            TradeOff(
+                presets=("paper",),
+                policies=("no-divert", "single-divert", "oracle"),
+                weights=("commit_time",),
+                episodes=10,
+                sweep_episodes=2,
+                workers=1,
+                out=folder,
+            )
         )
-    )
-    registry._entries.clear()
-    registry._entries.update(kept[0])
-    registry._paths.clear()
-    registry._paths.update(kept[1])
     return folder
 
 
@@ -109,6 +118,16 @@ def test_policies_fly_validation_and_weights_fly_tuning(out: Path) -> None:
     assert [line["value"] for line in lines if line["weight"] == "commit_time"] == ["0.5", "7.5"]
     assert not any(line["on_front"] == "True" for line in lines if line["policy"] == "oracle")
     assert any(line["on_front"] == "True" for line in lines if line["policy"] == "single-divert")
+
+
+def test_every_point_leaves_its_rows_and_where_they_come_from(out: Path) -> None:
+    assert json.loads((out / "provenance.json").read_text())["options"]["sweep_episodes"] == 2
+    for label, lines in (("paper/policies", 3 * 10), ("paper/weights", 3 * 2)):
+        with (out / label / "episodes.csv").open() as stream:
+            assert len(list(csv.DictReader(stream))) == lines
+        told = json.loads((out / label / "provenance.json").read_text())
+        assert told["study"]["split"] == ("validation" if label == "paper/policies" else "tuning")
+        assert sum(session["episodes"] for session in told["flight"]["sessions"]) == lines // 3
 
 
 def test_no_policy_beats_the_bounds(out: Path) -> None:

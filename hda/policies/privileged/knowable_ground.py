@@ -23,20 +23,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from guidance.arrays import Array
+from guidance.golden_section import divide, keep_lower, keep_upper
 from guidance.kernel import compile_kernel
 from guidance.state import State
 from hda.site_selection import Site
 from hda.task.observation import ScenarioView
-from hda.task.rules import Rules
-from hda.task.scenario import Scenario
+from hda.task.scenario import Scenario, ground_point
 
-Array = NDArray[np.float64]
-
-_GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 _SECTIONS = 18  # of each golden section
 _TIMES = 96  # times of flight tried
 _HEIGHTS = 16  # heights at the look tried before the golden section
@@ -44,12 +43,35 @@ _CELL = math.sqrt(0.5)  # [m] from a cell's centre to its corner
 _ALLOWANCE = 1.0  # [m/s] for the grids, and for a touchdown elsewhere in the cell than at its centre
 
 
+class _LookTimes(NamedTuple):
+    """[s] from the start to the look, and from there to the landing."""
+
+    before: float
+    after: float
+
+
+class _FactNumbers(NamedTuple):
+    """What the facts need beside the geometry.
+
+    Attributes:
+        gravity: [m/s^2] downward.
+        budget: [m/s] D + w_s, and the allowance.
+        interval: [s] between looks.
+        slope: tangent of the off-nadir limit.
+    """
+
+    gravity: float
+    budget: float
+    interval: float
+    slope: float
+
+
 @compile_kernel
-def _two_impulses(offset: Array, velocity: Array, pull: float, time: float) -> float:
+def _two_impulses(offset: Array, velocity: Array, gravity: float, time: float) -> float:
     """[m/s] of fact 1 for rest at `offset` from the lander; gravity points down the third axis."""
     first, last = 0.0, 0.0
     for axis in range(3):
-        fall = 0.5 * pull * time if axis == 2 else 0.0
+        fall = 0.5 * gravity * time if axis == 2 else 0.0
         first += (offset[axis] / time - velocity[axis] + fall) ** 2
         last += (offset[axis] / time - fall) ** 2
     return math.sqrt(first) + math.sqrt(last)
@@ -57,12 +79,13 @@ def _two_impulses(offset: Array, velocity: Array, pull: float, time: float) -> f
 
 @compile_kernel
 def _three_impulses(
-    point: Array, offset: Array, velocity: Array, pull: float, before: float, after: float
+    point: tuple[float, float, float], offset: Array, velocity: Array, gravity: float, times: _LookTimes
 ) -> float:
     """[m/s] of fact 3; `point`, the lander's place at the look, and `offset` count from the start."""
+    before, after = times
     first, middle, last = 0.0, 0.0, 0.0
     for axis in range(3):
-        g = -pull if axis == 2 else 0.0
+        g = -gravity if axis == 2 else 0.0
         outward, onward = point[axis] / before, (offset[axis] - point[axis]) / after
         first += (outward - velocity[axis] - 0.5 * g * before) ** 2
         middle += (onward - outward - 0.5 * g * (before + after)) ** 2
@@ -71,88 +94,89 @@ def _three_impulses(
 
 
 @compile_kernel
+def _bearing_cost(
+    angle: float, height: float, offset: Array, velocity: Array, numbers: _FactNumbers, times: _LookTimes
+) -> float:
+    """[m/s] of fact 3 for a look from the rim of the cone above the site, at one height and bearing."""
+    radius = numbers.slope * height + _CELL
+    point = (offset[0] + radius * math.cos(angle), offset[1] + radius * math.sin(angle), offset[2] + height)
+    return _three_impulses(point, offset, velocity, numbers.gravity, times)
+
+
+@compile_kernel
 def _best_bearing(
-    height: float, offset: Array, velocity: Array, pull: float, times: tuple[float, float], slope: float
+    height: float, offset: Array, velocity: Array, numbers: _FactNumbers, times: _LookTimes
 ) -> float:
     """Least cost over the rim of the cone above the site, at one height."""
-    point = np.empty(3)
-    point[2] = offset[2] + height
-    radius = slope * height + _CELL
     middle = math.atan2(-offset[1], -offset[0])
-    low, high = middle - 0.5 * math.pi, middle + 0.5 * math.pi
-    best = np.inf
-    left, right = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
-    costs = np.empty(2)
-    for _ in range(_SECTIONS):
-        for side in range(2):
-            angle = left if side == 0 else right
-            point[0] = offset[0] + radius * math.cos(angle)
-            point[1] = offset[1] + radius * math.sin(angle)
-            costs[side] = _three_impulses(point, offset, velocity, pull, times[0], times[1])
-            best = min(best, costs[side])
-        if costs[0] < costs[1]:
-            high, right = right, left
-            left = high - _GOLDEN * (high - low)
+    bracket = divide(middle - 0.5 * math.pi, middle + 0.5 * math.pi)
+    at_first = _bearing_cost(bracket.first, height, offset, velocity, numbers, times)
+    at_second = _bearing_cost(bracket.second, height, offset, velocity, numbers, times)
+    best = min(at_first, at_second)
+    for _ in range(_SECTIONS - 1):
+        if at_first < at_second:
+            bracket, at_second = keep_lower(bracket), at_first
+            at_first = _bearing_cost(bracket.first, height, offset, velocity, numbers, times)
         else:
-            low, left = left, right
-            right = low + _GOLDEN * (high - low)
+            bracket, at_first = keep_upper(bracket), at_second
+            at_second = _bearing_cost(bracket.second, height, offset, velocity, numbers, times)
+        best = min(best, at_first, at_second)
     return best
 
 
 @compile_kernel
-def _sees(
-    offset: Array, velocity: Array, pull: float, times: tuple[float, float], slope: float, budget: float
-) -> bool:
-    """Whether fact 3 holds for a look `times[0]` seconds from now and a landing `times[1]` after it."""
+def _sees(offset: Array, velocity: Array, numbers: _FactNumbers, times: _LookTimes) -> bool:
+    """Whether fact 3 holds for a look and a landing at these times."""
     before, after = times
+    gravity, budget = numbers.gravity, numbers.budget
     across = math.sqrt(offset[0] ** 2 + offset[1] ** 2)
     # on the flight of two impulses the lander stands this far from the site's vertical:
     if (
         across * after / (before + after)
-        <= slope * after * (-offset[2] / (before + after) + 0.5 * pull * before) + _CELL
+        <= numbers.slope * after * (-offset[2] / (before + after) + 0.5 * gravity * before) + _CELL
     ):
-        return _two_impulses(offset, velocity, pull, before + after) <= budget
-    top = -offset[2] + 0.5 * velocity[2] ** 2 / pull + 0.5 * pull * (before + after) ** 2
+        return _two_impulses(offset, velocity, gravity, before + after) <= budget
+    top = -offset[2] + 0.5 * velocity[2] ** 2 / gravity + 0.5 * gravity * (before + after) ** 2
     best, cheapest = 0, np.inf
     for k in range(_HEIGHTS + 1):
-        cost = _best_bearing(top * k / _HEIGHTS, offset, velocity, pull, times, slope)
+        cost = _best_bearing(top * k / _HEIGHTS, offset, velocity, numbers, times)
         if cost < cheapest:
             best, cheapest = k, cost
-    low, high = top * max(best - 1, 0) / _HEIGHTS, top * min(best + 1, _HEIGHTS) / _HEIGHTS
+    bracket = divide(top * max(best - 1, 0) / _HEIGHTS, top * min(best + 1, _HEIGHTS) / _HEIGHTS)
+    at_first = _best_bearing(bracket.first, offset, velocity, numbers, times)
+    at_second = _best_bearing(bracket.second, offset, velocity, numbers, times)
     for _ in range(_SECTIONS):
+        cheapest = min(cheapest, at_first, at_second)
         if cheapest <= budget:
             return True
-        left, right = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
-        at_left = _best_bearing(left, offset, velocity, pull, times, slope)
-        at_right = _best_bearing(right, offset, velocity, pull, times, slope)
-        cheapest = min(cheapest, at_left, at_right)
-        low, high = (low, right) if at_left < at_right else (left, high)
-    return cheapest <= budget
+        if at_first < at_second:
+            bracket, at_second = keep_lower(bracket), at_first
+            at_first = _best_bearing(bracket.first, offset, velocity, numbers, times)
+        else:
+            bracket, at_first = keep_upper(bracket), at_second
+            at_second = _best_bearing(bracket.second, offset, velocity, numbers, times)
+    return False
 
 
 @compile_kernel
 def _is_knowable(
-    offset: Array,
-    velocity: Array,
-    numbers: tuple[float, float, float, float],
-    seen_at_first: bool,
-    looks: bool,
+    offset: Array, velocity: Array, numbers: _FactNumbers, seen_at_first: bool, looks: bool
 ) -> bool:
-    """Facts 1 to 3; `numbers` = (pull, budget, interval, slope); without `looks` fact 1 alone."""
-    pull, budget, interval, slope = numbers
+    """Facts 1 to 3; without `looks` fact 1 alone."""
+    gravity, budget = numbers.gravity, numbers.budget
     speed = math.sqrt(velocity[0] ** 2 + velocity[1] ** 2 + velocity[2] ** 2)
-    longest = (budget + speed) / pull  # |V| alone costs more beyond
+    longest = (budget + speed) / gravity  # |V| alone costs more beyond
     for k in range(1, _TIMES + 1):
         time = longest * k / _TIMES
-        if _two_impulses(offset, velocity, pull, time) > budget:
+        if _two_impulses(offset, velocity, gravity, time) > budget:
             continue
         if seen_at_first or not looks:
             return True
-        look = interval
+        look = numbers.interval
         while look < time - 1e-9:
-            if _sees(offset, velocity, pull, (look, time - look), slope, budget):
+            if _sees(offset, velocity, numbers, _LookTimes(look, time - look)):
                 return True
-            look += interval
+            look += numbers.interval
     return False
 
 
@@ -161,8 +185,8 @@ class KnowableGround:
     """Where a flight could have landed softly on ground that it had seen; an outer bound.
 
     Attributes:
-        state: at the first look.
-        target: [m] shape (3,), centre of the first look, on the target plane.
+        state: the true one at the first look.
+        target: [m] shape (3,), where the centre of the first look truly lies on the target plane.
         width: [m] side of the first look.
         view: vehicle and sensor.
         soft_speed: [m/s] greatest vertical and horizontal speed of a soft touchdown.
@@ -172,7 +196,7 @@ class KnowableGround:
     target: Array
     width: float
     view: ScenarioView
-    soft_speed: float = Rules().soft_speed
+    soft_speed: float
 
     @property
     def budget(self) -> float:
@@ -191,10 +215,11 @@ class KnowableGround:
 
     def _holds(self, site: Array, looks: bool) -> bool:
         offset = np.asarray(site, dtype=np.float64) - self.state.position
-        slope = math.tan(self.view.off_nadir_limit)
+        slope = math.tan(self.view.lidar.off_nadir_limit)
         in_square = bool(np.abs(site[:2] - self.target[:2]).max() <= 0.5 * self.width + _CELL)
         near = math.hypot(offset[0], offset[1]) <= slope * -offset[2] + _CELL
-        numbers = (-float(self.view.gravity[2]), self.budget, self.view.decision_interval, slope)
+        gravity = -float(self.view.gravity[2])
+        numbers = _FactNumbers(gravity, self.budget, self.view.decision_interval, slope)
         return _is_knowable(offset, self.state.velocity, numbers, in_square and near, looks)
 
 
@@ -215,30 +240,28 @@ def nearest_known_site(ground: KnowableGround, safe: NDArray[np.bool_]) -> Site 
 
 
 @compile_kernel
-def _least_two_impulses(offsets: Array, velocity: Array, pull: float, longest: float) -> float:
+def _least_two_impulses(offsets: Array, velocity: Array, gravity: float, longest: float) -> float:
     """[m/s] of fact 1 at the offset, shape (n, 3), and the time of flight that cost least."""
     best = np.inf
     for row in range(offsets.shape[0]):
-        low, high = longest / _TIMES, longest
-        left, right = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
-        at_left = _two_impulses(offsets[row], velocity, pull, left)
-        at_right = _two_impulses(offsets[row], velocity, pull, right)
+        bracket = divide(longest / _TIMES, longest)
+        at_first = _two_impulses(offsets[row], velocity, gravity, bracket.first)
+        at_second = _two_impulses(offsets[row], velocity, gravity, bracket.second)
         for _ in range(_SECTIONS):
-            if at_left < at_right:
-                high, right, at_right = right, left, at_left
-                left = high - _GOLDEN * (high - low)
-                at_left = _two_impulses(offsets[row], velocity, pull, left)
+            if at_first < at_second:
+                bracket, at_second = keep_lower(bracket), at_first
+                at_first = _two_impulses(offsets[row], velocity, gravity, bracket.first)
             else:
-                low, left, at_left = left, right, at_right
-                right = low + _GOLDEN * (high - low)
-                at_right = _two_impulses(offsets[row], velocity, pull, right)
-        best = min(best, at_left, at_right)
+                bracket, at_first = keep_upper(bracket), at_second
+                at_second = _two_impulses(offsets[row], velocity, gravity, bracket.second)
+        best = min(best, at_first, at_second)
     return best
 
 
 def first_ground(scenario: Scenario) -> KnowableGround:
     """The knowable ground of an episode, at its start."""
-    preset, state, target = scenario.preset, scenario.initial_state, scenario.nominal_target
+    preset, state = scenario.preset, scenario.initial_state
+    target = ground_point(scenario, scenario.nominal_target)
     width = preset.lidar.width(state.position, target)
     return KnowableGround(state, target, width, scenario.view, preset.rules.soft_speed)
 
@@ -259,9 +282,9 @@ def least_propellant(scenario: Scenario) -> float:
         return math.inf
     sites = np.column_stack([column + 0.5, row + 0.5, np.full(row.size, ground.target[2])])
     state, view = ground.state, ground.view
-    pull = -float(view.gravity[2])
-    longest = (ground.budget + float(np.linalg.norm(state.velocity))) / pull
-    cost = _least_two_impulses(sites - state.position, state.velocity, pull, longest)
+    gravity = -float(view.gravity[2])
+    longest = (ground.budget + float(np.linalg.norm(state.velocity))) / gravity
+    cost = _least_two_impulses(sites - state.position, state.velocity, gravity, longest)
     spared = math.sqrt(2.0) * ground.soft_speed + _ALLOWANCE
     burnt = state.mass * -math.expm1(-max(cost - spared, 0.0) / view.lander.exhaust_velocity)
     return burnt / (state.mass - view.lander.dry_mass)

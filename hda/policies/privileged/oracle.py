@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from hda.ground.tile import Tile
 from hda.site_selection import Site
 from hda.task.observation import Observation, ScenarioView
+from hda.task.scenario import Scenario
 
 
 @lru_cache(maxsize=32)
@@ -51,6 +52,11 @@ class OracleSite:
 
     truth: Tile = field(repr=False)
     clearance: float = 2.0
+
+    @classmethod
+    def informed(cls, truth: Scenario) -> OracleSite:
+        """Make the selection that knows the tile of this scenario."""
+        return cls(truth.tile)
 
     def begin(self, view: ScenarioView) -> None:
         """No site yet."""

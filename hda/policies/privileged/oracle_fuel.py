@@ -5,14 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.two_impulse import divert_cost
 from hda.ground.tile import Tile
 from hda.policies.hazard_aware import load_kernels
 from hda.policies.privileged.oracle import safe_clearance
 from hda.site_selection import Site
 from hda.task.observation import Observation, ScenarioView
+from hda.task.scenario import Scenario
 
 _BLOCK = 8  # [m] side of the blocks that are priced by their middle first
 
@@ -28,7 +29,7 @@ def cheapest_clear_site(tile: Tile, observation: Observation, view: ScenarioView
     clear = room >= min(clearance, float(room.max()))
     plane = float(observation.target[2])
 
-    def price(south: float, west: float, count: tuple[int, ...], step: float) -> NDArray[np.float64]:
+    def price(south: float, west: float, count: tuple[int, ...], step: float) -> Array:
         rows, columns = (np.arange(number, dtype=np.float64) for number in count)
         east, north = west + step * columns, south + step * rows
         return divert_cost(observation.state, east, north, plane, view.lander, view.gravity)
@@ -66,6 +67,11 @@ class CheapestSafeSite:
 
     truth: Tile = field(repr=False)
     clearance: float = 2.0
+
+    @classmethod
+    def informed(cls, truth: Scenario) -> CheapestSafeSite:
+        """Make the selection that knows the tile of this scenario."""
+        return cls(truth.tile)
 
     def begin(self, view: ScenarioView) -> tuple[ScenarioView, Site | None]:
         """No site yet; the map of clearances is made here, once per tile."""

@@ -9,12 +9,11 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from rl.inference.arrays import Array32
 from rl.learning.box_spaces import check_environment
 from rl.learning.recurrent.hyperparameters import Hyperparameters
 from rl.learning.recurrent.losses import ActorCritic
 from rl.learning.recurrent.networks import NetworkSizes
-
-Array = NDArray[np.float32]
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,16 +26,16 @@ class AgentMemory:
         action: shape (n, a), last action in [-1, 1].
     """
 
-    hidden: Array
-    cell: Array
-    action: Array
+    hidden: Array32
+    cell: Array32
+    action: Array32
 
     @classmethod
     def empty(cls, environments: int, memory: int, action: int) -> AgentMemory:
         """Nothing remembered: zeros."""
         return cls(*(np.zeros((environments, size), np.float32) for size in (memory, memory, action)))
 
-    def kept(self, keep: Array) -> AgentMemory:
+    def kept(self, keep: Array32) -> AgentMemory:
         """The memory where `keep`, shape (n,), is 1, and nothing where it is 0."""
         return AgentMemory(*(part * keep[:, None] for part in vars(self).values()))
 
@@ -73,7 +72,7 @@ class RecurrentAgent:
             env.observation_space.shape[0],
             env.action_space.shape[0],
             settings.memory,
-            settings.head,
+            settings.hidden,
             previous_reward=settings.plus,
         )
         self.networks = ActorCritic.untrained(self.sizes, settings.plus, seed)
@@ -85,12 +84,12 @@ class RecurrentAgent:
 
     def predict(
         self,
-        observation: Array,
+        observation: Array32,
         state: AgentMemory | None = None,
         episode_start: NDArray[np.bool_] | bool | None = None,
         deterministic: bool = False,
         reward: NDArray[np.floating] | float | None = None,
-    ) -> tuple[Array, AgentMemory]:
+    ) -> tuple[Array32, AgentMemory]:
         """Action and memory after one observation, or after one observation of each of n environments.
 
         Args:
@@ -122,7 +121,7 @@ class RecurrentAgent:
         own = self._unscaled(action)
         return (own[0] if np.ndim(observation) == 1 else own), after
 
-    def _act(self, seen: Array, memory: AgentMemory, reward: Array) -> tuple[Array, Array, Array]:
+    def _act(self, seen: Array32, memory: AgentMemory, reward: Array32) -> tuple[Array32, Array32, Array32]:
         """Action without noise, and what the LSTM keeps: hidden and cell."""
         history = [seen, memory.action]
         if self.settings.plus:
@@ -136,7 +135,7 @@ class RecurrentAgent:
     def _empty_memory(self, n: int) -> AgentMemory:
         return AgentMemory.empty(n, self.settings.memory, self.action_space.shape[0])
 
-    def _unscaled(self, action: Array) -> Array:
+    def _unscaled(self, action: Array32) -> Array32:
         """From [-1, 1] to the bounds of the action space, in its own type: rounding never leaves it."""
         low, high = self.action_space.low, self.action_space.high
         own = (low + 0.5 * (action + 1.0) * (high - low)).astype(self.action_space.dtype)

@@ -12,7 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float32]
+from guidance.arrays import Array
+from rl.inference.arrays import Array32
+
 _ROWS = ("observations", "actions", "rewards", "terminated")
 
 
@@ -28,9 +30,9 @@ class Episode:
             observation still has a value.
     """
 
-    observations: Array
-    actions: Array
-    rewards: Array
+    observations: Array32
+    actions: Array32
+    rewards: Array32
     terminated: bool
 
 
@@ -48,13 +50,13 @@ class SequenceBatch:
         previous_rewards: shape (T + 1, N), the reward that came with it; 0 before the first.
     """
 
-    observations: Array
-    actions: Array
-    rewards: Array
-    terminated: Array
-    counted: Array
-    previous_actions: Array
-    previous_rewards: Array
+    observations: Array32
+    actions: Array32
+    rewards: Array32
+    terminated: Array32
+    counted: Array32
+    previous_actions: Array32
+    previous_rewards: Array32
 
 
 class EpisodeReplay:
@@ -126,7 +128,7 @@ class EpisodeReplay:
         self._used += length + 1
         self._next_row = (self._next_row + length + 1) % self.capacity
 
-    def lengths_in_reach(self, batch_size: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    def lengths_to_draw(self, batch_size: int) -> tuple[NDArray[np.int64], Array]:
         """Lengths of which there are at least `batch_size` episodes, and their shares of the transitions."""
         lengths, counts = np.unique(self.lengths, return_counts=True)
         enough = counts >= batch_size
@@ -139,7 +141,7 @@ class EpisodeReplay:
         The length is drawn among those with at least `batch_size` episodes, in proportion to their
         transitions, so that every transition within them is as likely to be learnt from.
         """
-        lengths, shares = self.lengths_in_reach(batch_size)
+        lengths, shares = self.lengths_to_draw(batch_size)
         if lengths.size == 0:
             return None
         length = int(rng.choice(lengths, p=shares))

@@ -37,15 +37,14 @@ from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
+from rl.inference.arrays import Array32
 from rl.learning.recurrent.agent import AgentMemory, RecurrentAgent
 from rl.learning.recurrent.hyperparameters import Hyperparameters
 from rl.learning.recurrent.losses import SequenceTensors, actor_loss, critic_loss
 from rl.learning.recurrent.replay import Episode, EpisodeReplay, SequenceBatch
 
-Array = NDArray[np.float32]
 Schedule = Callable[[int], float]
 
 
@@ -82,7 +81,7 @@ class RecurrentTD3(RecurrentAgent):
         super().__init__(env, settings, seed)
         self.env, self.seed = env, seed
         self.learning_rate = learning_rate
-        self.action_prior: Callable[[int], Array] | None = None
+        self.action_prior: Callable[[int], Array32] | None = None
         rate = learning_rate(0)
         self.actor_optimizer = torch.optim.Adam(self.actor.parameters(), lr=rate, fused=True)
         self.critic_optimizer = torch.optim.Adam(self.critic.parameters(), lr=rate, fused=True)
@@ -90,8 +89,8 @@ class RecurrentTD3(RecurrentAgent):
         self._n_updates = self._episode_num = 0
         self.logger: Any = None
         # the episode under way
-        self._seen: list[Array] = []
-        self._actions: list[Array] = []
+        self._seen: list[Array32] = []
+        self._actions: list[Array32] = []
         self._rewards: list[float] = []
         self._memory: AgentMemory | None = None
 

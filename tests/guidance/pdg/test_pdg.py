@@ -1,8 +1,6 @@
 """`solve_pdg` end to end: optima by three methods, refusals, dispersed and harsh starts, replanning."""
 
 import math
-import statistics
-import time
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
@@ -440,15 +438,10 @@ def test_guess_without_a_flight_is_ignored():
     assert plan.thrust.tobytes() == guidance.solve_pdg(START, TARGET).thrust.tobytes()
 
 
-def test_free_time_costs_at_most_two_fixed_time_solves():
+def test_free_time_takes_at_most_two_solves():
+    """The indirect method gives the time of flight; `python -m studies.bench` says what that costs."""
     rng = np.random.default_rng(8)
-    starts = [paper_start(rng) for _ in range(15)]
-    ratios = []
-    for start in [starts[0], *starts]:  # the first builds the solvers
-        clock = time.process_time()
-        plan = guidance.solve_pdg(start, TARGET)
-        free = time.process_time() - clock
-        clock = time.process_time()
-        guidance.solve_pdg(start, TARGET, time_of_flight=plan.time_of_flight)
-        ratios.append(free / (time.process_time() - clock))
-    assert statistics.median(ratios[1:]) < 2.0
+    for _ in range(15):
+        free = guidance.solve_pdg(paper_start(rng), TARGET)
+        assert free.status is PlanStatus.OPTIMAL
+        assert 1 <= free.solves <= 2

@@ -10,7 +10,7 @@ import pytest
 
 import hda
 from guidance import State
-from hda.flight.episode import advance, begin_flight, elevation_angle, fly, observe
+from hda.flight.episode import advance, begin_flight, elevation_angle, fly, fly_legs, observe
 from hda.flight.outcome import Ending
 from hda.flight.record import EpisodeRecord
 from hda.policy import Decision, Policy, ZemZevCommand
@@ -123,6 +123,26 @@ def test_the_steps_are_the_flight(scenarios):
             assert (step.outcome is None) == (k < len(record.decisions) - 1)
             if step.outcome is not None:
                 assert same(step.outcome, record.outcome)
+
+
+def test_legs_carry_the_memory_from_look_to_look_and_end_with_the_flight(scenarios):
+    def decide(observation, memory: tuple[int, ...]):
+        command = ZemZevCommand(6.0, 2.0, observation.time_to_go)
+        return Decision(observation.target, command), (*memory, observation.index)
+
+    given = []
+
+    def remember(observation, memory):
+        given.append(memory)
+        return decide(observation, memory)
+
+    legs = list(fly_legs(scenarios[0], remember, ()))
+    record = fly(hda.make_policy("no-divert"), scenarios[0])
+    assert given == [tuple(range(k)) for k in range(len(legs))]
+    assert [leg.step.outcome is None for leg in legs] == [True] * (len(legs) - 1) + [False]
+    assert same(tuple(leg.observation for leg in legs), record.observations)
+    assert same(tuple(leg.step.segment for leg in legs), record.segments)
+    assert all(min(leg.look_time, leg.decision_time, leg.flight_time) > 0.0 for leg in legs)
 
 
 def test_a_step_taken_twice_is_the_same_step(scenarios):

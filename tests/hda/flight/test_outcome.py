@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from guidance import PAPER_LANDER, State
-from hda.flight.outcome import Ending, Outcome, RewardWeights, classify, score_step
+from hda.flight.outcome import Contact, Ending, Outcome, RewardWeights, classify, score_step
 from hda.task.rules import Rules
 
 TARGET = np.array([400.0, 300.0, 50.0])
@@ -21,7 +21,7 @@ def judge(
     velocity=(0.0, 0.0, -0.5), landed=True, safe=True, empty=False, miss=(0.0, 0.0), mass=1165.0, rules=RULES
 ) -> Outcome:
     final = State(TARGET + np.array([*miss, 0.0]), np.array(velocity), mass)
-    return classify(INITIAL, final, TARGET, (landed, safe, empty), (PAPER_LANDER, rules))
+    return classify(INITIAL, final, TARGET, Contact(landed, safe, empty), PAPER_LANDER, rules)
 
 
 BEYOND = 1.0 + 1e-12

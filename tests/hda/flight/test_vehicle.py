@@ -16,8 +16,8 @@ from guidance import (
     time_to_go,
     zem_zev_acceleration,
 )
-from hda.flight.held_thrust import hold_period
-from hda.flight.vehicle import FlightErrors, FlightStatus, Segment, fly_interval
+from hda.flight.held_thrust import FlightConditions, VehicleLimits, hold_period
+from hda.flight.vehicle import ControlPeriods, FlightErrors, FlightStatus, Segment, fly_interval
 from hda.policy import Decision, ZemZevCommand
 from tests.oracles import flown_interval
 
@@ -27,6 +27,7 @@ PLANE = 50.0
 SITE = np.array([500.0, 400.0, PLANE])
 EXHAUST_VELOCITY = 9.80665 * 325.0
 SEEDS = st.integers(0, 2**32 - 1)
+INTERVAL = ControlPeriods(0.5, 10)
 STATUS = {
     FlightStatus.FLYING: "flying",
     FlightStatus.TOUCHDOWN: "touchdown",
@@ -42,7 +43,7 @@ def state_at(height: float, climb: float, mass: float = 1200.0, offset=(0.0, 0.0
 def fly(
     state: State,
     command: ZemZevCommand,
-    interval: tuple[float, int] = (0.5, 10),
+    interval: ControlPeriods = INTERVAL,
     thrust_error: float = 0.0,
     lander: Lander = PAPER_LANDER,
 ) -> Segment:
@@ -58,7 +59,7 @@ def magnitudes(vectors: np.ndarray) -> np.ndarray:
     return np.linalg.norm(vectors, axis=1)
 
 
-def random_case(rng: np.random.Generator) -> tuple[State, ZemZevCommand, tuple[float, int], float, Lander]:
+def random_case(rng: np.random.Generator) -> tuple[State, ZemZevCommand, ControlPeriods, float, Lander]:
     """Starts from high up to a hand's breadth above the plane, full and nearly empty tanks."""
     height = float(10.0 ** rng.uniform(-1.0, 2.9))
     speed = math.sqrt(height)
@@ -74,7 +75,7 @@ def random_case(rng: np.random.Generator) -> tuple[State, ZemZevCommand, tuple[f
     )
     periods = int(rng.integers(1, 12))
     lander = Lander(min_thrust=rng.choice([0.0, 1500.0]), max_thrust=rng.uniform(4000.0, 12000.0))
-    return state, command, (5.0 / periods, periods), rng.uniform(-0.05, 0.05), lander
+    return state, command, ControlPeriods(5.0 / periods, periods), rng.uniform(-0.05, 0.05), lander
 
 
 def test_random_intervals_agree_with_dop853_and_its_events():
@@ -89,7 +90,8 @@ def test_random_intervals_agree_with_dop853_and_its_events():
             (command.position_gain, command.velocity_gain),
             command.time_to_go,
             command.time_to_go_rate,
-            *interval,
+            interval.period,
+            interval.count,
             error,
         )
         vehicle = flown_interval.Vehicle(
@@ -125,11 +127,12 @@ def test_after_the_cut_off_the_vehicle_falls_as_galileo_says(height, climb, drif
 
 def hold(state: State, thrust, duration: float, error: float = 0.0, lander: Lander = PAPER_LANDER):
     """hold_period with plain arguments: (time flown, status, state reached)."""
-    vehicle = (lander.min_thrust, lander.max_thrust, lander.exhaust_velocity, lander.dry_mass, math.pi)
-    out = np.empty(7)
-    flown, status = hold_period(
-        state.as_array(), np.array(thrust, dtype=float), error, duration, GRAVITY, vehicle, PLANE, out
+    vehicle = VehicleLimits(
+        lander.min_thrust, lander.max_thrust, lander.exhaust_velocity, lander.dry_mass, math.pi
     )
+    conditions = FlightConditions(duration, PLANE, GRAVITY, vehicle, error, np.zeros(6))
+    out = np.empty(7)
+    flown, status = hold_period(state.as_array(), np.array(thrust, dtype=float), conditions, out)
     return flown, FlightStatus(status), out
 
 
@@ -217,10 +220,10 @@ def test_the_ground_comes_before_the_tank_where_it_is_reached_first():
 @pytest.mark.parametrize("period", [0.1, 0.5, 1.0])
 def test_the_engine_is_cut_at_half_a_control_period(period):
     state = state_at(100.0, -5.0)
-    at_limit = fly(state, ZemZevCommand(6.0, 2.0, 0.5 * period), (period, 5))
+    at_limit = fly(state, ZemZevCommand(6.0, 2.0, 0.5 * period), ControlPeriods(period, 5))
     assert len(at_limit.time) == 2
     assert not at_limit.commanded.any()
-    above = fly(state, ZemZevCommand(6.0, 2.0, 0.5 * period * (1.0 + 1e-9)), (period, 5))
+    above = fly(state, ZemZevCommand(6.0, 2.0, 0.5 * period * (1.0 + 1e-9)), ControlPeriods(period, 5))
     assert above.time[1] == pytest.approx(period)
     assert above.commanded[0].any()
     assert not above.commanded[1:].any()
@@ -232,12 +235,12 @@ def test_the_cut_off_holds_at_the_end_of_an_interval_too(rate):
     period, periods = 0.5, 10
     state = state_at(300.0, -20.0)
     limit = rate * period * periods + 0.5 * period
-    cut = fly(state, ZemZevCommand(6.0, 2.0, limit - 1e-9, rate), (period, periods))
+    cut = fly(state, ZemZevCommand(6.0, 2.0, limit - 1e-9, rate), ControlPeriods(period, periods))
     assert cut.status is FlightStatus.TOUCHDOWN
     assert len(cut.time) == periods + 2
     assert cut.commanded[:-1].any(axis=1).all()
     assert not cut.commanded[-1].any()
-    kept = fly(state, ZemZevCommand(6.0, 2.0, limit + 1e-9, rate), (period, periods))
+    kept = fly(state, ZemZevCommand(6.0, 2.0, limit + 1e-9, rate), ControlPeriods(period, periods))
     assert kept.status is FlightStatus.FLYING
     assert len(kept.time) == periods + 1
     assert kept.time_to_go == pytest.approx(0.5 * period + 1e-9, rel=1e-6)
@@ -260,7 +263,7 @@ def test_the_time_to_go_counts_down_at_its_rate(remaining, rate):
 def test_each_interval_holds_the_saturated_law_and_the_error_comes_after_saturation(seed):
     state, command, interval, error, lander = random_case(np.random.default_rng(seed))
     segment = fly(state, command, interval, error, lander)
-    period = interval[0]
+    period = interval.period
     for k, thrust in enumerate(segment.commanded):
         remaining = command.time_to_go - command.time_to_go_rate * period * k
         if remaining <= period / 2.0:
@@ -283,7 +286,7 @@ def test_each_interval_holds_the_saturated_law_and_the_error_comes_after_saturat
 
 def test_a_saturated_engine_with_a_positive_error_exceeds_its_greatest_thrust():
     state = state_at(100.0, -60.0)
-    segment = fly(state, ZemZevCommand(6.0, 2.0, 5.0), (0.5, 1), 0.05)
+    segment = fly(state, ZemZevCommand(6.0, 2.0, 5.0), ControlPeriods(0.5, 1), 0.05)
     assert np.linalg.norm(segment.commanded[0]) == pytest.approx(12000.0, rel=1e-12)
     burnt = segment.path[0, 6] - segment.path[1, 6]
     assert burnt == pytest.approx(1.05 * 12000.0 * 0.5 / EXHAUST_VELOCITY, rel=1e-9)
@@ -302,7 +305,7 @@ def test_n_nodes_have_n_minus_one_intervals(seed):
     np.testing.assert_array_equal(segment.path[0], state.as_array())
     np.testing.assert_array_equal(segment.final_state.as_array(), segment.path[-1])
     if segment.status is FlightStatus.FLYING:
-        assert n == interval[1] + 1
+        assert n == interval.count + 1
         assert segment.path[-1, 2] > PLANE
     else:
         assert segment.path[-1, 2] == pytest.approx(PLANE, abs=1e-6)
@@ -314,7 +317,9 @@ def test_n_nodes_have_n_minus_one_intervals(seed):
 def descend(state: State, period: float) -> Segment:
     """An undisturbed 6/2 flight to the site, as one long interval."""
     remaining = time_to_go(state, SITE)
-    return fly(state, ZemZevCommand(6.0, 2.0, remaining), (period, math.ceil(remaining / period) + 1))
+    return fly(
+        state, ZemZevCommand(6.0, 2.0, remaining), ControlPeriods(period, math.ceil(remaining / period) + 1)
+    )
 
 
 @settings(max_examples=30)

@@ -52,7 +52,7 @@ def test_the_default_lander_has_seven_orientations_of_41_to_57_cells():
     assert sorted({len(inside) for inside in cells}) == [41, 49, 57]
     assert len(set.union(*cells)) == 69
     assert len(footprint.support) == 69 + 28
-    assert footprint.reach == 5
+    assert footprint.half_size == 5
 
 
 @pytest.mark.parametrize("pixel_size", [1.0, 0.5, 0.25, 0.2, 0.1])
@@ -61,7 +61,7 @@ def test_the_lander_keeps_its_size_at_any_pixel_size(pixel_size: float):
     distance = np.hypot(*footprint.pads.T) * pixel_size
     # The outer edge of the pads lies on the 10 m circle, to a cell.
     assert np.all(np.abs(distance + 0.5 - 5.0) < pixel_size)
-    assert footprint.reach == {1.0: 5, 0.5: 10, 0.25: 20, 0.2: 25, 0.1: 50}[pixel_size]
+    assert footprint.half_size == {1.0: 5, 0.5: 10, 0.25: 20, 0.2: 25, 0.1: 50}[pixel_size]
     if pixel_size == 0.1:
         assert len(footprint.pads) == 64
         assert len(footprint.footprint_cells(0)) == 45**2 + 44**2
@@ -126,7 +126,7 @@ def test_the_ground_of_that_comparison_is_neither_all_safe_nor_all_unsafe():
 def test_on_a_plane_the_slope_is_that_of_the_plane(angle: float, azimuth: float, pixel_size: float):
     rows, columns = np.indices((24, 25)) * pixel_size
     dem = math.tan(math.radians(angle)) * (math.cos(azimuth) * columns + math.sin(azimuth) * rows) + 7.0
-    reach = make_footprint(10.0, 1.0, pixel_size).reach
+    reach = make_footprint(10.0, 1.0, pixel_size).half_size
     # A pad of one cell touches the plane itself; a wider one is lifted, equally for all four.
     safety = assess_safety(dem, pixel_size, pad_diameter=0.9 * pixel_size)
     inner = (slice(reach, -reach), slice(reach, -reach))

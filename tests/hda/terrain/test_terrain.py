@@ -270,7 +270,7 @@ def test_timings_are_of_the_asked_number_of_runs():
     timings = measure_terrain(repeats=2, size=64)
     assert timings[0].name == "terrain, 64 x 64 cells of 1 m"
     assert timings[1].name == "safety map, 64 x 64 cells of 1 m, 1 thread"
-    assert all(len(timing.seconds) == 2 and 0.0 < timing.median < 60.0 for timing in timings)
+    assert all(len(timing.seconds) == 2 and min(timing.seconds) > 0.0 for timing in timings)
     with pytest.raises(ValueError, match="repeats"):
         measure_terrain(repeats=0)
 

@@ -50,7 +50,7 @@ def test_lengths_are_drawn_by_their_transitions_among_those_with_enough_episodes
     for length, count in ((3, 20), (5, 30), (7, 4)):
         for _ in range(count):
             replay.store(numbered(length, length))
-    lengths, shares = replay.lengths_in_reach(20)
+    lengths, shares = replay.lengths_to_draw(20)
     assert lengths.tolist() == [3, 5]
     np.testing.assert_allclose(shares, [60 / 210, 150 / 210])
     rng = np.random.default_rng(0)

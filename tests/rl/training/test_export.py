@@ -41,6 +41,7 @@ def test_exported_weights_fly_and_tell_where_they_came_from(runs, tmp_path):
     artefact = load_artefact(tmp_path / "weights" / "sac", "actor")
     training = artefact.card["training"]
     assert [seed["seed"] for seed in training["seeds"]] == [0, 1]
+    assert (training["recipe"], training["planned_steps"]) == ("sac", 60)
     assert training["command"].startswith(f"python -m rl.train sac --seed {training['seed']} --preset paper")
     assert "--hidden 8 8" in training["command"]
     assert "--learning-rate" not in training["command"]

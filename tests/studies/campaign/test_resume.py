@@ -10,6 +10,7 @@ import sys
 import time
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -112,6 +113,19 @@ def test_a_damaged_shard_is_named_and_flown_again(
     compare(options(out, resume=True))
     assert contents(out) == contents(whole)
     assert "checksum" in capfd.readouterr().err
+
+
+def test_a_shard_is_hashed_once_for_all_policies(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import hashlib
+
+    hashed: list[int] = []
+    monkeypatch.setattr(
+        "studies.campaign.shards.hashlib",
+        SimpleNamespace(sha256=lambda body: hashed.append(len(body)) or hashlib.sha256(body)),
+    )
+    compare(options(tmp_path / "study"))
+    shards = len(list((tmp_path / "study").glob("shards/episodes-*.jsonl")))
+    assert len(hashed) == 2 * shards  # as it is written, and as it is read
 
 
 @pytest.mark.parametrize(

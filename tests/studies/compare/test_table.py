@@ -7,10 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from studies.campaign.episode_files import write_episodes
 from studies.campaign.monte_carlo import Chunk
 from studies.campaign.rows import MEASURES, EpisodeRow
 from studies.compare.scores import score_study
-from studies.compare.table import PolicySummary, summarize_policy, write_episodes, write_table
+from studies.compare.table import PolicySummary, summarize_policy, write_table
 from studies.statistics.ratios import clustered_interval, mcnemar_p_value, wilson_interval
 from studies.statistics.reliability import exact_lower_bound
 

@@ -1,0 +1,189 @@
+"""The two laws flown over one interval, in compiled code: ZEM/ZEV, and the feedback about a plan."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from guidance.arrays import Array
+from guidance.kernel import compile_kernel
+from guidance.thrust_limits import limit_into
+from guidance.zem_zev import zem_zev_into
+from hda.flight.held_thrust import (
+    FLYING,
+    TOUCHDOWN,
+    FlightConditions,
+    VehicleLimits,
+    fall_to_plane,
+    hold_period,
+)
+
+_LEAST_TELLING = 0.05  # [m/s^2] commanded acceleration under which the engine's error is not estimated
+
+
+class _ZemZevNumbers(NamedTuple):
+    """`ZemZevCommand` for the kernels, under the same names."""
+
+    position_gain: float
+    velocity_gain: float
+    time_to_go: float
+    time_to_go_rate: float
+
+
+class _FeedbackGains(NamedTuple):
+    """About a plan, on position [1/s^2] and velocity [1/s]."""
+
+    position: float
+    velocity: float
+
+
+class _Reference(NamedTuple):
+    """What a plan asks for at the control instants: shapes (n, 3), (n, 3), (n - 1, 3)."""
+
+    position: Array
+    velocity: Array
+    acceleration: Array
+
+
+class _Log(NamedTuple):
+    """Where a kernel writes: shapes (m + 1,), (m + 1, 7), (m, 3)."""
+
+    time: Array
+    path: Array
+    commanded: Array
+
+
+_PlainConditions = tuple[float, float, Array, tuple[float, float, float, float, float], float, Array]
+"""`FlightConditions` without names."""
+
+
+@compile_kernel
+def _fly_zem_zev(
+    start: Array,
+    site: Array,
+    command: _ZemZevNumbers,
+    conditions: FlightConditions,
+    log: _Log,
+) -> tuple[int, int, int]:
+    """Fly one interval: (nodes written, status, control periods in which the pointing limit acted)."""
+    time, path, commanded = log
+    period, gravity, vehicle = conditions.period, conditions.gravity, conditions.vehicle
+    gains = (command.position_gain, command.velocity_gain)
+    seen = start.copy()
+    limited = 0
+    periods = commanded.shape[0] - 1
+    path[0] = start
+    time[0] = 0.0
+    for k in range(periods + 1):
+        remaining = command.time_to_go - command.time_to_go_rate * period * k
+        if remaining <= 0.5 * period:
+            commanded[k] = 0.0
+            time[k + 1] = time[k] + fall_to_plane(path[k], gravity, conditions.plane, path[k + 1])
+            return k + 2, TOUCHDOWN, limited
+        if k == periods:
+            break
+        seen[:6] = path[k, :6] + conditions.navigation_error
+        zem_zev_into(seen, site, gains, remaining, gravity, commanded[k])
+        commanded[k] *= path[k, 6]
+        if limit_into(commanded[k], vehicle.min_thrust, vehicle.max_thrust, vehicle.pointing_limit):
+            limited += 1
+        flown, status = hold_period(path[k], commanded[k], conditions, path[k + 1])
+        time[k + 1] = time[k] + flown
+        if status != FLYING:
+            return k + 2, status, limited
+    return periods + 1, FLYING, limited
+
+
+@compile_kernel
+def _fly_plan(
+    start: Array,
+    reference: _Reference,
+    gains: _FeedbackGains,
+    conditions: FlightConditions,
+    log: _Log,
+) -> tuple[int, int, int]:
+    """Track a reference for one interval; returns as `_fly_zem_zev`.
+
+    The engine's error ratio is unknown at the start of the interval; once a period has been flown it is known
+    from the change of velocity, which is compared with what the command should have given.
+    """
+    time, path, commanded = log
+    period, gravity, vehicle = conditions.period, conditions.gravity, conditions.vehicle
+    navigation = conditions.navigation_error
+    periods = commanded.shape[0] - 1
+    planned = reference.acceleration.shape[0]
+    estimate = 0.0
+    limited = 0
+    path[0] = start
+    time[0] = 0.0
+    for k in range(periods + 1):
+        if k >= planned:
+            commanded[k] = 0.0
+            time[k + 1] = time[k] + fall_to_plane(path[k], gravity, conditions.plane, path[k + 1])
+            return k + 2, TOUCHDOWN, limited
+        if k == periods:
+            break
+        for axis in range(3):
+            miss = path[k, axis] + navigation[axis] - reference.position[k, axis]
+            drift = path[k, 3 + axis] + navigation[3 + axis] - reference.velocity[k, axis]
+            acceleration = reference.acceleration[k, axis]
+            acceleration -= gains.position * miss
+            acceleration -= gains.velocity * drift
+            commanded[k, axis] = path[k, 6] * acceleration / (1.0 + estimate)
+        if limit_into(commanded[k], vehicle.min_thrust, vehicle.max_thrust, vehicle.pointing_limit):
+            limited += 1
+        flown, status = hold_period(path[k], commanded[k], conditions, path[k + 1])
+        time[k + 1] = time[k] + flown
+        if status != FLYING:
+            return k + 2, status, limited
+        estimate = _estimate_error(path[k], path[k + 1], commanded[k], period, gravity, estimate)
+    return periods + 1, FLYING, limited
+
+
+@compile_kernel
+def _estimate_error(
+    before: Array,
+    after: Array,
+    commanded: Array,
+    period: float,
+    gravity: Array,
+    estimate: float,
+) -> float:
+    """Engine's error ratio from one period's change of velocity; the old estimate where it hardly burnt."""
+    square = 0.0
+    along = 0.0
+    for axis in range(3):
+        gained = (after[3 + axis] - before[3 + axis]) / period - gravity[axis]
+        square += commanded[axis] * commanded[axis]
+        along += commanded[axis] * gained
+    mean_mass = 0.5 * (before[6] + after[6])
+    if square < (_LEAST_TELLING * mean_mass) ** 2:
+        return estimate
+    return along * mean_mass / square - 1.0
+
+
+@compile_kernel
+def enter_zem_zev(
+    start: Array,
+    site: Array,
+    command: tuple[float, float, float, float],
+    conditions: _PlainConditions,
+    log: tuple[Array, Array, Array],
+) -> tuple[int, int, int]:
+    """`_fly_zem_zev` of plain tuples: numba takes them from Python several times as fast as named ones."""
+    period, plane, gravity, vehicle, thrust_error, navigation = conditions
+    named = FlightConditions(period, plane, gravity, VehicleLimits(*vehicle), thrust_error, navigation)
+    return _fly_zem_zev(start, site, _ZemZevNumbers(*command), named, _Log(*log))
+
+
+@compile_kernel
+def enter_plan(
+    start: Array,
+    reference: tuple[Array, Array, Array],
+    gains: tuple[float, float],
+    conditions: _PlainConditions,
+    log: tuple[Array, Array, Array],
+) -> tuple[int, int, int]:
+    """`_fly_plan` of plain tuples."""
+    period, plane, gravity, vehicle, thrust_error, navigation = conditions
+    named = FlightConditions(period, plane, gravity, VehicleLimits(*vehicle), thrust_error, navigation)
+    return _fly_plan(start, _Reference(*reference), _FeedbackGains(*gains), named, _Log(*log))

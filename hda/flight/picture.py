@@ -1,0 +1,108 @@
+"""Pictures of flights: over the true safety map, and against time; and a flight as arrays on the disk."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hda.flight.palette import COLORS
+from hda.flight.record import EpisodeRecord
+from hda.ground.tile import Tile
+from hda.task.observation import Observation
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_MARGIN = 40.0  # [m] around a flight's ground track
+_LEAST_SHOWN = 130.0  # [m] half side of the ground that is shown, at least
+
+
+def save_flight(path: Path, record: EpisodeRecord) -> None:
+    """Keep a flight as NPZ without pickle: time, path (n, 7), thrust (n - 1, 3), sites (decisions, 3)."""
+    sites = np.array([decision.site for decision in record.decisions])
+    np.savez_compressed(path, time=record.time, path=record.path, thrust=record.thrust, sites=sites)
+
+
+def draw_flight(record: EpisodeRecord) -> Figure:
+    """Draw one flight: over the true safety map with the shrinking field of view, and against time.
+
+    Returns:
+        The figure, not tied to any window.
+    """
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(14, 6.5), layout="constrained")
+    grid = figure.add_gridspec(3, 2, width_ratios=(1.1, 1.0))
+    draw_ground_track(figure.add_subplot(grid[:, 0]), record)
+    altitude = figure.add_subplot(grid[0, 1])
+    speed = figure.add_subplot(grid[1, 1], sharex=altitude)
+    thrust = figure.add_subplot(grid[2, 1], sharex=altitude)
+    altitude.plot(record.time, record.position[:, 2], color=COLORS[0])
+    altitude.set_ylabel("altitude [m]")
+    draw_velocity(speed, record)
+    draw_thrust(thrust, record)
+    for axis in (altitude, speed, thrust):
+        axis.grid(alpha=0.25)
+        for observation in record.observations:
+            axis.axvline(observation.time, color="0.8", linewidth=0.7, zorder=0)
+    outcome = record.outcome
+    figure.suptitle(
+        f"{record.policy}, episode {record.scenario.streams.episode}: {outcome.ending},"
+        f" {outcome.touchdown_speed:.2f} m/s, {100.0 * outcome.propellant_fraction:.1f} % propellant"
+    )
+    return figure
+
+
+def draw_velocity(axis: Axes, record: EpisodeRecord) -> None:
+    """Draw the components of the velocity against time."""
+    for k, name in enumerate(("east", "north", "up")):
+        axis.plot(record.time, record.velocity[:, k], color=COLORS[k], label=name)
+    axis.set_ylabel("velocity [m/s]")
+    axis.legend(loc="lower right", frameon=False, ncols=3)
+
+
+def draw_thrust(axis: Axes, record: EpisodeRecord) -> None:
+    """Draw the size of the applied thrust, as it is held, against time."""
+    magnitude = np.linalg.norm(record.thrust, axis=1)
+    axis.stairs(magnitude, record.time, baseline=None, color=COLORS[1])
+    axis.set_ylabel("thrust [N]")
+    axis.set_xlabel("time [s]")
+
+
+def draw_ground_track(axis: Axes, record: EpisodeRecord) -> None:
+    """Draw a flight over the true safety map, with its targets and its field of view at each look."""
+    draw_true_safety(axis, record.scenario.tile)
+    for observation in record.observations:
+        draw_field_of_view(axis, observation)
+    sites = np.array([record.scenario.nominal_target, *(decision.site for decision in record.decisions)])
+    axis.plot(record.position[:, 0], record.position[:, 1], color=COLORS[1], label="flight")
+    axis.plot(sites[:, 0], sites[:, 1], "o-", color=COLORS[0], markersize=4, linewidth=0.8, label="targets")
+    axis.plot(*record.outcome.touchdown[:2], "*", color=COLORS[3], markersize=14, label="touchdown")
+    shown = np.vstack([record.position[:, :2], sites[:, :2]])
+    middle = (shown.min(axis=0) + shown.max(axis=0)) / 2.0
+    half = max(float((shown.max(axis=0) - shown.min(axis=0)).max()) / 2.0 + _MARGIN, _LEAST_SHOWN)
+    axis.set_xlim(middle[0] - half, middle[0] + half)
+    axis.set_ylim(middle[1] - half, middle[1] + half)
+    axis.set_title("light: safe; squares: field of view at each look", fontsize="medium")
+    axis.legend(loc="upper left", framealpha=0.9)
+
+
+def draw_true_safety(axis: Axes, tile: Tile) -> None:
+    """Draw the true safety map of a tile, in metres; safe ground is light."""
+    rows, columns = tile.deterministic.shape
+    extent = (0, columns, 0, rows)
+    axis.imshow(tile.deterministic, origin="lower", extent=extent, cmap="gray", vmin=-0.6, vmax=1.2)
+    axis.set_xlabel("east [m]")
+    axis.set_ylabel("north [m]")
+
+
+def draw_field_of_view(axis: Axes, observation: Observation) -> None:
+    """Draw the square that a look covers, about its target."""
+    from matplotlib.patches import Rectangle
+
+    east, north = (float(value) for value in observation.target[:2] - observation.width / 2.0)
+    side = observation.width
+    axis.add_patch(Rectangle((east, north), side, side, fill=False, color=COLORS[4]))

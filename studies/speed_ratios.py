@@ -1,0 +1,149 @@
+"""Times that may grow unseen, each as a ratio to other work of the same run, with the limit that it keeps.
+
+A ratio of two times means the same on every machine, where a time does not. Work and reference take turns, so
+that what else the machine does meets both alike.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from time import process_time
+from typing import TypeVar
+
+import numpy as np
+
+from guidance import solve_pdg
+from guidance.validation import finite_number
+from hda.flight.episode import begin_flight, observe
+from hda.task.scenario import sample_scenario
+from rl.inference.latent import load_encoder
+from studies.columns import Column
+
+Result = TypeVar("Result")
+
+_CALLS = 10  # of work that is too short for one
+_IMPORT = "import time; s = time.process_time(); import {module}; print(time.process_time() - s)"
+
+FREE_TO_FIXED_LIMIT = 2.0
+"""Most that a free-time solve may cost, in fixed-time solves of the same nodes."""
+ENCODING_LIMIT = 7.0
+"""Most that encoding a look may cost, in looks."""
+IMPORT_LIMIT = 0.5
+"""Most that `import guidance` may cost, in imports of numpy, which it leaves to those who need it."""
+
+
+@dataclass(frozen=True)
+class SpeedRatio:
+    """One piece of work against another.
+
+    Attributes:
+        work: what was done.
+        reference: what it is measured by.
+        work_seconds: [s] median processor time of the work.
+        reference_seconds: [s] of the reference.
+        limit: greatest ratio that is allowed.
+    """
+
+    work: str
+    reference: str
+    work_seconds: float
+    reference_seconds: float
+    limit: float
+
+    @property
+    def ratio(self) -> float:
+        """The work in units of the reference."""
+        return self.work_seconds / self.reference_seconds
+
+    @property
+    def kept(self) -> bool:
+        """Whether the ratio is at most the limit."""
+        return self.ratio <= self.limit
+
+
+COLUMNS: tuple[Column[SpeedRatio], ...] = (
+    Column("work", "work", lambda r: r.work, words=True),
+    Column("reference", "over", lambda r: r.reference, words=True),
+    Column("work_ms", "work", lambda r: 1e3 * r.work_seconds, digits=3, unit="ms"),
+    Column("reference_ms", "reference", lambda r: 1e3 * r.reference_seconds, digits=3, unit="ms"),
+    Column("ratio", "ratio", lambda r: r.ratio, digits=2),
+    Column("limit", "limit", lambda r: r.limit, form="{:g}".format),
+    Column("kept", "kept", lambda r: r.kept, form=lambda kept: "yes" if kept else "NO"),
+)
+"""The ratios: the bench's file and console read this list."""
+
+
+def measure_ratios(preset: str = "paper", repeats: int = 15) -> list[SpeedRatio]:
+    """Measure every ratio.
+
+    Args:
+        preset: setting of the starts and looks, on the tuning tiles.
+        repeats: starts and looks that are measured, after one that warms up.
+
+    Raises:
+        ValueError: `repeats` is less than one, or the preset is unknown.
+    """
+    finite_number("repeats", repeats, at_least=1)
+    return [_compare_solves(preset, repeats), _compare_encoding(preset, repeats), _compare_imports(repeats)]
+
+
+def _compare_solves(preset: str, repeats: int) -> SpeedRatio:
+    free, fixed = [], []
+    for episode in range(repeats + 1):
+        scenario = sample_scenario(preset, 0, episode, "tuning")
+        view = scenario.view
+        solve = partial(
+            solve_pdg, scenario.initial_state, view.nominal_target, lander=view.lander, gravity=view.gravity
+        )
+        plan, seconds = _time(solve)
+        free.append(seconds)
+        fixed.append(_time(partial(solve, time_of_flight=plan.time_of_flight))[1])
+    return SpeedRatio(
+        "free-time solve", "fixed-time solve", _median(free), _median(fixed), FREE_TO_FIXED_LIMIT
+    )
+
+
+def _compare_encoding(preset: str, repeats: int) -> SpeedRatio:
+    encoder = load_encoder()
+    encodings, looks = [], []
+    for episode in range(repeats + 1):
+        scenario = sample_scenario(preset, 0, episode, "tuning")
+        look = partial(observe, scenario, begin_flight(scenario))
+        looks.append(_least(look))
+        encodings.append(_least(partial(encoder.encode, look().safety_map)))
+    return SpeedRatio("encoding a look", "the look", _median(encodings), _median(looks), ENCODING_LIMIT)
+
+
+def _compare_imports(repeats: int) -> SpeedRatio:
+    pairs = [(_import_seconds("guidance"), _import_seconds("numpy")) for _ in range(repeats + 1)]
+    own, numpy = ([pair[k] for pair in pairs] for k in (0, 1))
+    return SpeedRatio("import guidance", "import numpy", _median(own), _median(numpy), IMPORT_LIMIT)
+
+
+def _time(work: Callable[[], Result]) -> tuple[Result, float]:
+    """What the work gives, and its processor time [s]."""
+    start = process_time()
+    result = work()
+    return result, process_time() - start
+
+
+def _least(work: Callable[[], object]) -> float:
+    """[s] least processor time of the work, which is too short for one call."""
+    return min(_time(lambda: [work() for _ in range(_CALLS)])[1] for _ in range(_CALLS)) / _CALLS
+
+
+def _median(seconds: Sequence[float]) -> float:
+    """The middle one, without the first, which warms up."""
+    return float(np.median(seconds[1:]))
+
+
+def _import_seconds(module: str) -> float:
+    """[s] processor time of an import in a process of its own."""
+    told = subprocess.run(
+        [sys.executable, "-c", _IMPORT.format(module=module)], capture_output=True, text=True, check=True
+    )
+    return float(told.stdout)

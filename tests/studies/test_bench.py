@@ -1,0 +1,47 @@
+"""The bench: times of the inner loops, and ratios that say when a limit is not kept."""
+
+import csv
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from studies.bench import Bench, bench
+from studies.columns import Column
+from studies.speed_ratios import COLUMNS, SpeedRatio, measure_ratios
+
+
+def cell(name: str, ratio: SpeedRatio) -> str:
+    column: Column[SpeedRatio] = next(column for column in COLUMNS if column.key == name)
+    return column.text(ratio)
+
+
+def test_a_ratio_above_its_limit_is_shouted() -> None:
+    ratio = SpeedRatio("work", "reference", 0.003, 0.002, 1.5)
+    assert (cell("ratio", ratio), cell("limit", ratio), cell("kept", ratio)) == ("1.50", "1.5", "yes")
+    assert cell("kept", replace(ratio, work_seconds=0.0031)) == "NO"
+    assert cell("kept", replace(ratio, reference_seconds=0.0019)) == "NO"
+
+
+def test_every_ratio_is_of_two_works() -> None:
+    ratios = measure_ratios(repeats=2)
+    assert [ratio.work for ratio in ratios] == ["free-time solve", "encoding a look", "import guidance"]
+    for ratio in ratios:
+        assert ratio.work_seconds > 0.0
+        assert ratio.ratio == pytest.approx(ratio.work_seconds / ratio.reference_seconds)
+    with pytest.raises(ValueError, match="repeats must be at least 1"):
+        measure_ratios(repeats=0)
+
+
+@pytest.mark.slow
+def test_the_bench_leaves_its_tables(tmp_path: Path) -> None:
+    works, ratios = bench(Bench(episodes=3, repeats=1, out=tmp_path))
+    with (tmp_path / "times.csv").open() as stream:
+        times = list(csv.DictReader(stream))
+    with (tmp_path / "ratios.csv").open() as stream:
+        kept = list(csv.DictReader(stream))
+    assert [row["work"] for row in times] == [work.name for work in works]
+    assert all(0.0 < float(row["median_ms"]) <= float(row["high_ms"]) for row in times)
+    assert [float(row["ratio"]) for row in kept] == pytest.approx([ratio.ratio for ratio in ratios])
+    assert json.loads((tmp_path / "provenance.json").read_text())["options"]["episodes"] == 3
