@@ -83,12 +83,16 @@ class PdgCommand:
 
 def describe(plan: Plan) -> str:
     """A plan in a few lines: what it costs, and what it misses when flown through the true motion."""
+    bound = []
+    if plan.certificate is not None and not math.isnan(plan.optimality_gap):
+        bound.append(f"optimality gap  {1e3 * plan.optimality_gap:.1f} g, {plan.certificate.scope}")
     flown = [f"{name} {getattr(plan.residuals, name):.2g} {unit}" for name, unit in RESIDUAL_UNITS.items()]
     return "\n".join(
         [
             f"status          {plan.status.value} ({plan.method})",
             f"time of flight  {plan.time_of_flight:.3f} s, {plan.nodes} nodes",
             f"propellant      {plan.propellant:.3f} kg, final mass {plan.mass[-1]:.3f} kg",
+            *bound,
             f"landing error   {plan.landing_error:.2f} m",
             "flown, it misses what was planned or allowed by",
             *(f"                {', '.join(flown[k : k + 3])}" for k in range(0, len(flown), 3)),

@@ -1,4 +1,4 @@
-"""Flights that keep a lander's limits, made without any planner: random thrust, flown to wherever it leads."""
+"""Flights that keep a lander's limits, made without a planner: random thrust, flown to wherever it leads."""
 
 import math
 from dataclasses import dataclass
@@ -42,7 +42,7 @@ def _directions(lander: Lander, count: int, rng: np.random.Generator) -> np.ndar
 
 
 def random_flight(rng: np.random.Generator) -> AdmissibleFlight:
-    """A few arcs of steady thrust, each full, least or between, on a random world; it ends below its start."""
+    """A few arcs of steady thrust, each full, least or between, on a random world; it ends below the start."""
     while True:
         flight = _flight(rng)
         if flight is not None:

@@ -1,4 +1,4 @@
-"""Weak duality: whatever the primer, no flight that keeps the limits spends less than the dual function says."""
+"""Weak duality: whatever the primer, no flight within the limits spends less than the dual function says."""
 
 import numpy as np
 import pytest

@@ -53,7 +53,7 @@ def test_the_bound_needs_neither_the_best_flight_nor_the_indirect_method():
 
 
 def vertical_descent(height, sink, lander, mass, pull):
-    """Propellant [kg] and time [s] of the least-propellant vertical descent: free fall, then full thrust, by the rocket equation."""
+    """Propellant [kg] and time [s] of the best vertical descent: free fall, then full thrust."""
     c, flow = lander.exhaust_velocity, lander.max_mass_flow
 
     def left_over(speed):
