@@ -42,7 +42,7 @@ def _directions(lander: Lander, count: int, rng: np.random.Generator) -> np.ndar
 
 
 def random_flight(rng: np.random.Generator) -> AdmissibleFlight:
-    """A few arcs of steady thrust, each full, least or between, on a random world; it ends below the start."""
+    """A few arcs of steady thrust, full, least or between, on a random world; it ends below the start."""
     while True:
         flight = _flight(rng)
         if flight is not None:

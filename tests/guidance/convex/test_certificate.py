@@ -80,7 +80,7 @@ def test_proofs_survive_scaling_but_not_a_wider_bound():
 
 def test_free_time_names_its_scope():
     far = task(target=np.array([4000.0, 0.0, 50.0]))
-    steep = replace(task(), problem=replace(task().problem, glide_slope_limit=0.1))
+    steep = task(glide_slope_limit=0.25)
     for asked, cause, words in ((far, "propellant", "dual bound"), (steep, "glide slope", "Farkas")):
         certificate = prove_free_time(asked)
         assert isinstance(certificate, Certificate)
