@@ -1,5 +1,6 @@
 """The cheap estimate of a landing's propellant: closed forms, a slow search, and `solve_pdg`."""
 
+import itertools
 import math
 
 import numpy as np
@@ -74,13 +75,8 @@ def test_what_it_cannot_price_is_refused_by_name():
     axis = np.zeros(1)
     with pytest.raises(ValueError, match="altitude 40 m must be above the plane"):
         divert_cost(state, axis, axis, 50.0, PAPER_LANDER, GRAVITY)
-    for gravity in (
-        [0.1, 0, -1.62],
-        [-0.1, 0, -1.62],
-        [0, 0.1, -1.62],
-        [0, -0.1, -1.62],
-        [0, 0, 0],
-        [0, 0, 1.62],
-    ):
+    for gravity in itertools.product((-0.1, 0.0, 0.1), (-0.1, 0.0, 0.1), (-1.62, 0.0, 1.62)):
+        if gravity == (0.0, 0.0, -1.62):
+            continue
         with pytest.raises(ValueError, match="gravity must point along -z"):
             divert_cost(state, axis, axis, 0.0, PAPER_LANDER, gravity)
