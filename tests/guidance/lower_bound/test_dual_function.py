@@ -64,7 +64,7 @@ def test_the_gradient_is_that_of_the_value(seed):
         ends = [dual_value(primer + sign * unit, time, case, unused) for sign in (1.0, -1.0)]
         slope = (ends[0] - ends[1]) / 2e-5
         scale = case.full * time + np.linalg.norm(case.gravity) * time + abs(slope)
-        assert gradient[axis] * units[axis] == pytest.approx(slope, abs=1e-4 * scale)
+        assert gradient[axis] * units[axis] == pytest.approx(slope, abs=1e-4 * float(scale))
 
 
 @settings(max_examples=50, deadline=None)
@@ -95,6 +95,6 @@ def test_the_support_function_is_the_greatest_product_over_the_cone():
         for primer in rng.normal(0.0, 1.0, (20, 6)):
             value = support(primer, 2.0, case, direction)
             p = primer[:3] + 2.0 * primer[3:]
-            assert value == pytest.approx(np.tensordot(p, cone, 1).max(), abs=2e-4 * np.linalg.norm(p))
+            assert value == pytest.approx(np.tensordot(p, cone, 1).max(), abs=2e-4 * float(np.linalg.norm(p)))
             assert value == pytest.approx(p @ direction, abs=1e-12)
             assert np.linalg.norm(direction) == pytest.approx(1.0)

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from admissible_flights import random_flight
 from descents import GRAVITY, TARGET, paper_start
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.optimize import brentq
 
 import guidance
 from guidance import PAPER_LANDER, Lander, PlanStatus, State
@@ -56,23 +58,23 @@ def vertical_descent(height, sink, lander, mass, pull):
     """Propellant [kg] and time [s] of the best vertical descent: free fall, then full thrust."""
     c, flow = lander.exhaust_velocity, lander.max_mass_flow
 
+    def braking_time(speed):
+        """[s] of full thrust that stop the vehicle."""
+
+        def excess(time):
+            return -c * math.log1p(-flow * time / mass) - pull * time - speed
+
+        return cast("float", brentq(excess, 0.0, 0.999 * mass / flow, xtol=1e-13))
+
     def left_over(speed):
-        """[m] height left where the brakes, begun at this speed, have stopped the vehicle; and their time."""
-        low, high = 0.0, 0.999 * mass / flow
-        for _ in range(200):
-            time = 0.5 * (low + high)
-            gained = -c * math.log1p(-flow * time / mass) - pull * time
-            low, high = (time, high) if gained < speed else (low, time)
+        """[m] height left where the brakes, begun at this speed, have stopped the vehicle."""
+        time = braking_time(speed)
         rest = 1.0 - flow * time / mass
         braking = speed * time - c * (time + mass / flow * rest * math.log(rest)) + 0.5 * pull * time**2
-        return height - (speed**2 - sink**2) / (2.0 * pull) - braking, time
+        return height - (speed**2 - sink**2) / (2.0 * pull) - braking
 
-    slow, fast = sink, math.sqrt(sink**2 + 2.0 * pull * height)
-    for _ in range(200):
-        speed = 0.5 * (slow + fast)
-        above, time = left_over(speed)
-        slow, fast = (speed, fast) if above > 0.0 else (slow, speed)
-    return flow * time, (speed - sink) / pull + time
+    speed = cast("float", brentq(left_over, sink, math.sqrt(sink**2 + 2.0 * pull * height), xtol=1e-13))
+    return flow * braking_time(speed), (speed - sink) / pull + braking_time(speed)
 
 
 @settings(max_examples=40, deadline=None)
