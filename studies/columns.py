@@ -50,7 +50,7 @@ class Column(Generic[Row]):
         late: joined the file after others: it stands at its end, so that files keep their order.
         form: shows a number where decimals will not do.
         mark: what follows the value where it is shown, such as a star.
-        words: stands left, as words do.
+        words: is aligned as words are.
         brief: a document leaves its intervals out, the console the one clustered by tile.
         outputs: where it stands.
     """

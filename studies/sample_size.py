@@ -1,6 +1,6 @@
 """How many episodes a comparison takes, before any is flown.
 
-For two policies on the same episodes and the exact McNemar test: what matters is the share of episodes that
+For two policies on the same episodes and the exact McNemar test: what matters is the ratio of episodes that
 only one of them lands. If nothing is known of it, three cases are shown: the worse policy lands no episode
 that the better one does not, both fail independently, and half way. Episodes are taken as independent: use
 many tiles.
@@ -36,7 +36,7 @@ class SampleSize:
         power: probability of seeing it.
         significance: false-alarm rate of the two-sided test.
         reference: ratio of the reference policy [%]; the other is better by the difference.
-        discordant: share of episodes that only one of the two lands [%]; three cases by default.
+        discordant: ratio of episodes that only one of the two lands [%]; three cases by default.
         out: folder for results.
     """
 
@@ -53,7 +53,7 @@ def mcnemar_power(episodes: int, discordant: float, difference: float, significa
 
     Args:
         episodes: at least 1.
-        discordant: share of episodes that only one policy lands, in (0, 1].
+        discordant: ratio of episodes that only one policy lands, in (0, 1].
         difference: difference of the ratios, from 0 to `discordant`; at 0 this is the true false-alarm rate.
         significance: in (0, 0.5].
 
@@ -64,20 +64,20 @@ def mcnemar_power(episodes: int, discordant: float, difference: float, significa
     from scipy.stats import binom
 
     count = int(finite_number("episodes", episodes, at_least=1))
-    share = finite_number("discordant", discordant, above=0.0, at_most=1.0)
-    gap = finite_number("difference", difference, at_least=0.0, at_most=share)
+    ratio = finite_number("discordant", discordant, above=0.0, at_most=1.0)
+    gap = finite_number("difference", difference, at_least=0.0, at_most=ratio)
     alarm = finite_number("significance", significance, above=0.0, at_most=0.5)
-    spread = 9.0 * math.sqrt(count * share * (1.0 - share)) + 9.0
-    middle = count * share
+    spread = 9.0 * math.sqrt(count * ratio * (1.0 - ratio)) + 9.0
+    middle = count * ratio
     pairs = np.arange(max(0, int(middle - spread)), min(count, math.ceil(middle + spread)) + 1)
     # the test fails to reject above the greatest k with 2 P(K <= k) <= alarm
     limit = binom.ppf(0.5 * alarm, pairs, 0.5)
     limit = np.where(2.0 * binom.cdf(limit, pairs, 0.5) <= alarm, limit, limit - 1.0)
-    better = 0.5 + 0.5 * gap / share
+    better = 0.5 + 0.5 * gap / ratio
     tail = np.where(
         limit >= 0.0, _lower(bdtr, limit, pairs, better) + _lower(bdtr, limit, pairs, 1.0 - better), 0.0
     )
-    return float(min(1.0, (binom.pmf(pairs, count, share) * tail).sum()))
+    return float(min(1.0, (binom.pmf(pairs, count, ratio) * tail).sum()))
 
 
 def _lower(bdtr: np.ufunc, limit: np.ndarray, pairs: np.ndarray, chance: float) -> np.ndarray:
@@ -92,7 +92,7 @@ def comparison_episodes(
     Args:
         difference: difference of the ratios, above 0, at most `discordant`.
         power: in (0, 0.9999].
-        discordant: share of episodes that only one policy lands, in (0, 1].
+        discordant: ratio of episodes that only one policy lands, in (0, 1].
         significance: in (0, 0.5].
 
     Raises:
@@ -114,7 +114,7 @@ def comparison_episodes(
 
 
 def independent_discordance(reference: float, difference: float) -> float:
-    """Share of episodes that only one of two policies lands, if they fail independently of one another."""
+    """Ratio of episodes that only one of two policies lands, if they fail independently of one another."""
     other = reference + difference
     return reference * (1.0 - other) + other * (1.0 - reference)
 
@@ -124,7 +124,7 @@ class ComparisonPlan:
     """Episodes that see a difference of two policies.
 
     Attributes:
-        discordant: share of episodes that only one of them lands.
+        discordant: ratio of episodes that only one of them lands.
         episodes: so many of them.
         power: probability of seeing the difference.
     """
@@ -139,7 +139,7 @@ class DemonstrationPlan:
     """Episodes that show a reliability.
 
     Attributes:
-        reliability: share of flights that succeed.
+        reliability: ratio of flights that succeed.
         episodes: so many of them, for 0, 1, 2 and 3 failures.
     """
 
@@ -194,8 +194,8 @@ def plan_comparison(options: SampleSize) -> list[ComparisonPlan]:
 def plan_demonstration() -> list[DemonstrationPlan]:
     """Episodes that show a reliability with 90 % confidence, by the failures that are allowed."""
     return [
-        DemonstrationPlan(share, tuple(needed_episodes(share, 0.9, failures) for failures in _FAILURES))
-        for share in (0.95, 0.99, 0.9973, 0.99865)
+        DemonstrationPlan(ratio, tuple(needed_episodes(ratio, 0.9, failures) for failures in _FAILURES))
+        for ratio in (0.95, 0.99, 0.9973, 0.99865)
     ]
 
 

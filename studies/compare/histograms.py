@@ -34,14 +34,14 @@ class DecisionTimes:
         np.add.at(self._counts, bins, 1)
         self._greatest = max(self._greatest, float(np.max(seconds, initial=0.0)))
 
-    def quantile(self, share: float) -> float:
-        """Time [s] that a share of decisions does not exceed; 1 gives the greatest exactly; nan of none."""
+    def quantile(self, level: float) -> float:
+        """Time [s] that so many decisions (ratio) do not exceed; level 1 gives the greatest; nan of none."""
         total = int(self._counts.sum())
         if total == 0:
             return math.nan
-        if share >= 1.0:
+        if level >= 1.0:
             return self._greatest
-        place = int(np.searchsorted(np.cumsum(self._counts), share * (total - 1), side="right"))
+        place = int(np.searchsorted(np.cumsum(self._counts), level * (total - 1), side="right"))
         return min(_FINEST * 10.0 ** ((place + 0.5) / _BINS_PER_DECADE), self._greatest)
 
 

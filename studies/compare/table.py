@@ -84,7 +84,7 @@ def write_timings(path: Path, decision_time: dict[str, DecisionTimes]) -> None:
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(["policy", *(f"decision_time_ms_{q}" for q in ("p50", "p99", "max"))])
         for policy, times in decision_time.items():
-            quantiles = [1000.0 * times.quantile(share) for share in (0.5, 0.99, 1.0)]
+            quantiles = [1000.0 * times.quantile(level) for level in (0.5, 0.99, 1.0)]
             writer.writerow([policy, *(f"{value:.4g}" for value in quantiles)])
 
 

@@ -46,8 +46,8 @@ def _draw_descent(axis: Axes, record: EpisodeRecord) -> None:
     axis.set_ylim(bottom=0.0)
     speed = np.linalg.norm(record.velocity, axis=1)
     axis.plot(record.time, speed, color=COLORS[1], label="speed [m/s]")
-    share = 10.0 * np.linalg.norm(record.thrust, axis=1) / record.scenario.preset.lander.max_thrust
-    axis.stairs(share, record.time, baseline=None, color="0.6", label="thrust [tenths of the greatest]")
+    tenths = 10.0 * np.linalg.norm(record.thrust, axis=1) / record.scenario.preset.lander.max_thrust
+    axis.stairs(tenths, record.time, baseline=None, color="0.6", label="thrust [tenths of the greatest]")
     for observation in record.observations:
         axis.axvline(observation.time, color="0.85", linewidth=0.7, zorder=0)
     axis.legend(loc="lower left", fontsize="x-small", framealpha=0.9)
@@ -86,8 +86,8 @@ def _draw_look(axis: Axes, record: EpisodeRecord, observation: Observation) -> N
     axis.plot(*site[:2], "+", color=COLORS[0], markersize=11, markeredgewidth=1.8, label="chosen here")
     axis.set_xlim(x - half, x + half)
     axis.set_ylim(y - half, y + half)
-    left = float(record.time[-1]) - observation.time
-    axis.set_title(f"look {observation.index}, {left:.1f} s before the end", fontsize="small")
+    before_end = float(record.time[-1]) - observation.time
+    axis.set_title(f"look {observation.index}, {before_end:.1f} s before the end", fontsize="small")
     axis.tick_params(labelsize="x-small")
     axis.ticklabel_format(useOffset=False)
     if observation.index == record.observations[-1].index:

@@ -95,10 +95,10 @@ def _label(factor: Factor, level: float) -> str:
 def measure_hazard(preset: Preset, split: str) -> float:
     """Share of unsafe cells on the tiles of a split."""
     ground = Ground(preset.terrain, preset.criteria)
-    shares = [
+    unsafe = [
         1.0 - float(load_tile(ground, number, split).deterministic.mean()) for number in tile_numbers(split)
     ]
-    return float(np.mean(shares))
+    return float(np.mean(unsafe))
 
 
 def run_robustness(options: Robustness) -> list[Sweep]:

@@ -89,7 +89,7 @@ def study_stability(options: Stability) -> tuple[list[MarginRow], list[GainRow]]
 
         draw_stability(preset, options.required).savefig(out / "stability.png", dpi=110)
     title = f"ZEM/ZEV, control period {period:g} s; speeds in m/s, median / worst clock phase"
-    Console(width=max(Console().width, 160)).print(console_table(GAIN_COLUMNS, gain_rows, title))
+    Console(width=max(Console().width, 176)).print(console_table(GAIN_COLUMNS, gain_rows, title))
     console = Console()
     for sentence in words:
         console.print(f"- {sentence}", markup=False, highlight=False)

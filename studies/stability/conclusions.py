@@ -61,11 +61,11 @@ def _exact(rows: Sequence[GainRow], preset: Preset) -> str:
     vanishing = sum(r.speed_vanishes for r in rows)
     slow = min(rows, key=lambda r: r.power_1_real)
     start = mean_descent(preset)[2]
-    share = (0.5 * preset.rules.control_period / start) ** (slow.power_1_real - 1.0)
+    kept = (0.5 * preset.rules.control_period / start) ** (slow.power_1_real - 1.0)
     return (
         f"Exact continuous loop: the speed vanishes at touchdown for {vanishing} of {len(rows)} pairs, but "
         f"as t_go^{slow.power_1_real - 1.0:.2f} at {_pairs([slow])}: cut off at half a period, its slow "
-        f"solution keeps {100.0 * share:.0f} % of the speed it had at {start:.0f} s. Small K_V "
+        f"solution keeps {100.0 * kept:.0f} % of the speed it had at {start:.0f} s. Small K_V "
         "leaves a residual speed."
     )
 

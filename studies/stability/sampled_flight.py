@@ -121,16 +121,16 @@ def fly_sampled(
     times = np.maximum(clock.times_to_go, clock.frozen_below)[..., None]
     start = (np.array(value, dtype=np.float64, ndmin=1) for value in (position, velocity, gravity))
     r, v, g = (np.broadcast_to(value, (*times.shape[1:-1], value.size)) for value in start)
-    path, pace, push = [r], [v], []
-    for left in times:
-        a = -gains.position / left**2 * r - gains.damping / left * v
+    positions, velocities, accelerations = [r], [v], []
+    for time_to_go in times:
+        a = -gains.position / time_to_go**2 * r - gains.damping / time_to_go * v
         a = a - (0.5 * gains.position - gains.velocity) * g
         r = r + h * v + 0.5 * h**2 * (a + g)
         v = v + h * (a + g)
-        path.append(r)
-        pace.append(v)
-        push.append(a)
-    return SampledFlight(np.array(path), np.array(pace), np.array(push))
+        positions.append(r)
+        velocities.append(v)
+        accelerations.append(a)
+    return SampledFlight(np.array(positions), np.array(velocities), np.array(accelerations))
 
 
 def touch_down(flight: SampledFlight, period: float, gravity: ArrayLike) -> tuple[Array, Array]:
@@ -144,20 +144,20 @@ def touch_down(flight: SampledFlight, period: float, gravity: ArrayLike) -> tupl
     Returns:
         Speed [m/s] and time since the start [s], each of shape (), or one for each flight.
     """
-    pull = np.asarray(gravity, dtype=np.float64)
+    free_fall = np.asarray(gravity, dtype=np.float64)
     held = np.diff(flight.velocity, axis=0) / period
-    force = np.concatenate([held, np.broadcast_to(pull, (1, *held.shape[1:]))])
+    acceleration = np.concatenate([held, np.broadcast_to(free_fall, (1, *held.shape[1:]))])
     longest = np.full(flight.position.shape[:-1], period)
     longest[-1] = np.inf
-    height, climb, lift = flight.position[..., 2], flight.velocity[..., 2], force[..., 2]
-    square = climb**2 - 2.0 * lift * height
-    pace = np.sqrt(np.maximum(square, 0.0)) - climb
-    crossing = np.divide(2.0 * height, pace, out=np.full_like(pace, np.inf), where=pace > 0.0)
+    height, rise, upward = flight.position[..., 2], flight.velocity[..., 2], acceleration[..., 2]
+    square = rise**2 - 2.0 * upward * height
+    closing = np.sqrt(np.maximum(square, 0.0)) - rise
+    crossing = np.divide(2.0 * height, closing, out=np.full_like(closing, np.inf), where=closing > 0.0)
     crosses = (square >= 0.0) & (crossing <= longest) & np.isfinite(crossing)
     first = crosses.argmax(axis=0)[None]
     time = np.take_along_axis(crossing, first, axis=0)
     velocity = np.take_along_axis(flight.velocity, first[..., None], axis=0)
-    velocity = velocity + np.take_along_axis(force, first[..., None], axis=0) * time[..., None]
+    velocity = velocity + np.take_along_axis(acceleration, first[..., None], axis=0) * time[..., None]
     return np.linalg.norm(velocity[0], axis=-1), (first * period + time)[0]
 
 
@@ -179,9 +179,9 @@ class Growth:
 def error_growth(gains: Gains, clock: Clock) -> Growth:
     """Fly a velocity error of 1 m/s from the clock's first command to cut-off; worst of the phases."""
     flight = fly_sampled(gains, clock, 0.0, 1.0, 0.0)
-    push = np.abs(flight.acceleration)
+    correction = np.abs(flight.acceleration)
     return Growth(
         float(np.abs(flight.position[-1]).max()),
         float(np.abs(flight.velocity[-1]).max()),
-        float((push.max(axis=0) / push[0]).max()),
+        float((correction.max(axis=0) / correction[0]).max()),
     )

@@ -97,7 +97,7 @@ def mean_intervals(moments: Moments, measure: int, confidence: float = 0.95) -> 
     between = count * (means - mean)
     square = float(moments.square[:, measure].sum() + between @ (means - mean))
 
-    def reach(variance: float, freedom: int) -> Interval:
+    def student_interval(variance: float, freedom: int) -> Interval:
         if freedom < 1:
             return Interval(mean, -math.inf, math.inf)
         half = float(stdtrit(freedom, 0.5 + 0.5 * level)) * math.sqrt(variance)
@@ -105,4 +105,5 @@ def mean_intervals(moments: Moments, measure: int, confidence: float = 0.95) -> 
 
     independent = square / max(episodes - 1, 1) / episodes
     clustered = tiles / max(tiles - 1, 1) * float(between @ between) / episodes**2
-    return reach(independent, episodes - 1), reach(max(independent, clustered), tiles - 1)
+    by_tile = student_interval(max(independent, clustered), tiles - 1)
+    return student_interval(independent, episodes - 1), by_tile

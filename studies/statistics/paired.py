@@ -49,11 +49,11 @@ def pair_count_interval(pairs: PairCounts, confidence: float = 0.95) -> Interval
     correlation = _corrected_correlation(pairs)
     difference = (first - second) / count
 
-    def reach(near: float, far: float) -> float:
+    def half_width(near: float, far: float) -> float:
         return math.sqrt(max(0.0, near * near - 2.0 * correlation * near * far + far * far))
 
-    low = difference - reach(a.estimate - a.low, b.high - b.estimate)
-    high = difference + reach(a.high - a.estimate, b.estimate - b.low)
+    low = difference - half_width(a.estimate - a.low, b.high - b.estimate)
+    high = difference + half_width(a.high - a.estimate, b.estimate - b.low)
     return Interval(difference, max(-1.0, low), min(1.0, high))
 
 

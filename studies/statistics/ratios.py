@@ -15,8 +15,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from guidance.validation import finite_number
 
-_DRAWS_AT_ONCE = 2**20  # bounds the memory of a bootstrap to some ten megabytes
-
 
 @dataclass(frozen=True)
 class Interval:
@@ -109,42 +107,6 @@ def clustered_count_interval(successes: ArrayLike, episodes: ArrayLike, confiden
     normal = float(ndtri(0.5 + 0.5 * level))
     student = float(stdtrit(clusters - 1, 0.5 + 0.5 * level))
     return _score_interval(ratio, total / design_effect * (normal / student) ** 2, normal)
-
-
-def bootstrap_mean(
-    values: ArrayLike, rng: np.random.Generator, confidence: float = 0.95, resamples: int = 4000
-) -> Interval:
-    """Percentile bootstrap interval of a mean over independent values (Efron 1979).
-
-    Args:
-        values: shape (n,), finite.
-        rng: draws the resamples.
-        confidence: in (0, 0.9999].
-        resamples: number of resamples.
-
-    Returns:
-        The mean and its interval; one value alone shows no spread, and its interval is the whole line.
-
-    Raises:
-        ValueError: `values` is empty, not one-dimensional or not finite, or another argument is out of range.
-    """
-    sample = np.asarray(values, dtype=np.float64)
-    if sample.ndim != 1 or sample.size == 0:
-        raise ValueError(f"values must be a non-empty one-dimensional array, got shape {sample.shape}")
-    if not np.isfinite(sample).all():
-        raise ValueError(f"values must be finite, got {np.count_nonzero(~np.isfinite(sample))} that are not")
-    level = _confidence(confidence)
-    count = _whole_number("resamples", resamples, at_least=1)
-    mean = float(sample.mean())
-    if sample.size == 1:
-        return Interval(mean, -math.inf, math.inf)
-    means = np.empty(count)
-    rows = max(1, _DRAWS_AT_ONCE // sample.size)
-    for first in range(0, count, rows):
-        drawn = rng.integers(sample.size, size=(min(rows, count - first), sample.size), dtype=np.int32)
-        means[first : first + rows] = sample[drawn].mean(axis=1)
-    low, high = np.quantile(means, [0.5 - 0.5 * level, 0.5 + 0.5 * level])
-    return Interval(mean, float(low), float(high))
 
 
 def mcnemar_p_value(first: ArrayLike, second: ArrayLike) -> float:

@@ -20,7 +20,7 @@ from studies.statistics.ratios import Interval
 
 @dataclass(frozen=True)
 class OrderBound:
-    """A value that is not exceeded in a share of flights, with a confidence.
+    """A value that is not exceeded with a reliability, at a confidence.
 
     Attributes:
         value: the bound; one of the sample.
@@ -74,12 +74,12 @@ def _clopper_pearson(
     return Interval(successes / episodes, float(ends.low), float(ends.high))
 
 
-def allowed_failures(episodes: int, share: float, confidence: float = 0.9) -> int | None:
-    """Greatest number of failures that still shows that a requirement is met in a share of flights.
+def allowed_failures(episodes: int, reliability: float, confidence: float = 0.9) -> int | None:
+    """Greatest number of failures that still shows that a requirement is met with a reliability.
 
     Args:
         episodes: at least 1; independent.
-        share: the share of flights, in (0, 1).
+        reliability: ratio of flights that meet it, in (0, 1).
         confidence: one less the consumer's risk, in (0, 0.9999].
 
     Returns:
@@ -91,7 +91,7 @@ def allowed_failures(episodes: int, share: float, confidence: float = 0.9) -> in
     from scipy.stats import binom
 
     count = int(finite_number("episodes", episodes, at_least=1))
-    failure = 1.0 - _share(share)
+    failure = 1.0 - _below_one(reliability)
     risk = 1.0 - finite_number("confidence", confidence, above=0.0, at_most=0.9999)
     most = int(binom.ppf(risk, count, failure))
     while most >= 0 and binom.cdf(most, count, failure) > risk:
@@ -99,11 +99,11 @@ def allowed_failures(episodes: int, share: float, confidence: float = 0.9) -> in
     return most if most >= 0 else None
 
 
-def needed_episodes(share: float, confidence: float = 0.9, failures: int = 0) -> int:
+def needed_episodes(reliability: float, confidence: float = 0.9, failures: int = 0) -> int:
     """Least number of episodes in which so many failures may occur and the requirement is still shown.
 
     Args:
-        share: the share of flights that must meet it, in (0, 1).
+        reliability: ratio of flights that must meet it, in (0, 1).
         confidence: in (0, 0.9999].
         failures: failures to allow for, at least 0.
 
@@ -112,7 +112,7 @@ def needed_episodes(share: float, confidence: float = 0.9, failures: int = 0) ->
     """
     from scipy.stats import binom
 
-    failure = 1.0 - _share(share)
+    failure = 1.0 - _below_one(reliability)
     risk = 1.0 - finite_number("confidence", confidence, above=0.0, at_most=0.9999)
     allowed = int(finite_number("failures", failures, at_least=0))
     high = allowed + 1  # at one less everything may fail
@@ -121,12 +121,12 @@ def needed_episodes(share: float, confidence: float = 0.9, failures: int = 0) ->
     return bisect_left(range(high), True, key=lambda count: binom.cdf(allowed, count, failure) <= risk)
 
 
-def order_bound(values: ArrayLike, share: float = 0.9973, confidence: float = 0.9) -> OrderBound:
+def order_bound(values: ArrayLike, reliability: float = 0.9973, confidence: float = 0.9) -> OrderBound:
     """Upper bound of a quantile from order statistics: no distribution is assumed.
 
     Args:
         values: shape (n,), independent, no NaN; infinity counts as the worst.
-        share: the share of flights that stay below the bound, in (0, 1).
+        reliability: ratio of flights that stay below the bound, in (0, 1).
         confidence: in (0, 0.9999].
 
     Raises:
@@ -138,18 +138,20 @@ def order_bound(values: ArrayLike, share: float = 0.9973, confidence: float = 0.
     sample = np.sort(np.asarray(values, dtype=np.float64))
     if sample.ndim != 1 or sample.size == 0 or np.isnan(sample).any():
         raise ValueError("values must be a non-empty one-dimensional array without NaN")
-    exceeded = allowed_failures(sample.size, share, confidence)
+    exceeded = allowed_failures(sample.size, reliability, confidence)
     if exceeded is None:
         raise ValueError(
-            f"values: a bound for {share:.4%} at {confidence:.0%} confidence takes at least"
-            f" {needed_episodes(share, confidence)} values, got {sample.size}"
+            f"values: a bound for {reliability:.4%} at {confidence:.0%} confidence takes at least"
+            f" {needed_episodes(reliability, confidence)} values, got {sample.size}"
         )
-    reached = 1.0 - float(binom.cdf(exceeded, sample.size, 1.0 - share))
+    reached = 1.0 - float(binom.cdf(exceeded, sample.size, 1.0 - reliability))
     return OrderBound(float(sample[sample.size - 1 - exceeded]), exceeded, reached)
 
 
-def _share(share: float) -> float:
-    finite_number("share", share, above=0.0)
-    if share >= 1.0:
-        raise ValueError(f"share must be below 1: no sample shows that nothing ever fails, got {share:g}")
-    return share
+def _below_one(reliability: float) -> float:
+    finite_number("reliability", reliability, above=0.0)
+    if reliability >= 1.0:
+        raise ValueError(
+            f"reliability must be below 1: no sample shows that nothing ever fails, got {reliability:g}"
+        )
+    return reliability

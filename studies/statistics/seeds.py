@@ -123,10 +123,10 @@ def improvement_interval(
     drawn = _resample(resample, wins.size, resamples)
     interval = _expanded_percentiles(float(wins.mean()), drawn, (first, second), confidence)
     pairs = min(first.shape[0], second.shape[0]) * tasks.size
-    reach = (0.5 - 0.5 * confidence) ** (1.0 / pairs)
+    bound = (0.5 - 0.5 * confidence) ** (1.0 / pairs)
     if interval.estimate == 1.0:
-        return Interval(1.0, reach, 1.0)
-    return Interval(0.0, 0.0, 1.0 - reach) if interval.estimate == 0.0 else interval
+        return Interval(1.0, bound, 1.0)
+    return Interval(0.0, 0.0, 1.0 - bound) if interval.estimate == 0.0 else interval
 
 
 def _runs(name: str, value: ArrayLike, at_least: int = 1) -> NDArray[np.float64]:

@@ -19,11 +19,11 @@ _LEAST_REGRET = 1e-2  # [g] shown for this and less
 
 
 def draw_timing(methods: Sequence[Method], calls: Sequence[Call]) -> Figure:
-    """Draw the share of calls done by a time, and median regret against median time."""
+    """Draw how many calls are done by a time, and median regret against median time."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(15, 7.5), layout="constrained")
-    share, cost = figure.subplots(1, 2)
+    done, cost = figure.subplots(1, 2)
     families = list(dict.fromkeys(method.name for method in methods))
     for method in methods:
         color = COLORS[families.index(method.name) % len(COLORS)]
@@ -32,7 +32,7 @@ def draw_timing(methods: Sequence[Method], calls: Sequence[Call]) -> Figure:
             continue
         times = np.sort([1e3 * call.processor for call in own])
         dashes = ("-" if method.free else "--") if method.nodes > 31 else ("-." if method.free else ":")
-        share.step(
+        done.step(
             times,
             100.0 * np.arange(1, times.size + 1) / times.size,
             where="post",
@@ -52,9 +52,9 @@ def draw_timing(methods: Sequence[Method], calls: Sequence[Call]) -> Figure:
                 textcoords="offset points",
                 fontsize="small",
             )
-    share.set_xscale("log")
-    share.set_xlabel("processor time of a call [ms]")
-    share.set_ylabel("calls on feasible cases done [%]")
+    done.set_xscale("log")
+    done.set_xlabel("processor time of a call [ms]")
+    done.set_ylabel("calls on feasible cases done [%]")
     figure.legend(loc="outside lower center", ncols=5, fontsize="small", title="method, time, nodes")
     cost.set_xscale("log")
     cost.set_yscale("log")
@@ -62,6 +62,6 @@ def draw_timing(methods: Sequence[Method], calls: Sequence[Call]) -> Figure:
     cost.set_xlabel("median processor time [ms]")
     cost.set_ylabel("median propellant beyond the tight optimum [g]")
     cost.set_title("round: free time of flight; square: fixed; number: nodes", fontsize="medium")
-    for axis in (share, cost):
+    for axis in (done, cost):
         axis.grid(alpha=0.25, which="both")
     return figure

@@ -9,7 +9,7 @@ _MS = 1e3  # s -> ms
 _G = 1e3  # kg -> g
 
 
-def _share(count: int, cases: int) -> str:
+def _of_all(count: int, cases: int) -> str:
     return f"{count}/{cases}"
 
 
@@ -22,11 +22,11 @@ SUMMARY_COLUMNS: tuple[Column[Summary], ...] = (
     Column("nodes", "nodes", lambda s: s.method.rsplit(", ", 2)[2], outputs=Output.FILE),
     Column("feasible_calls", "feasible", lambda s: s.feasible, outputs=Output.FILE),
     Column("solved", "solved", lambda s: s.solved, outputs=Output.FILE),
-    Column("solved_of", "solved", lambda s: _share(s.solved, s.feasible), outputs=_SHOWN),
+    Column("solved_of", "solved", lambda s: _of_all(s.solved, s.feasible), outputs=_SHOWN),
     Column("limits_broken", "limits broken", lambda s: s.broken),
     Column("infeasible_calls", "infeasible", lambda s: s.infeasible, outputs=Output.FILE),
     Column("refused", "refused", lambda s: s.refused, outputs=Output.FILE),
-    Column("refused_of", "refused", lambda s: _share(s.refused, s.infeasible), outputs=_SHOWN),
+    Column("refused_of", "refused", lambda s: _of_all(s.refused, s.infeasible), outputs=_SHOWN),
     Column("cpu_ms_p50", "processor", lambda s: _MS * s.processor[0], digits=1, unit="ms"),
     Column("cpu_ms_p99", "99 %", lambda s: _MS * s.processor[1], digits=1, unit="ms"),
     Column("cpu_ms_max", "max", lambda s: _MS * s.processor[2], digits=1, unit="ms"),

@@ -2,7 +2,7 @@
 
 Policies fly the validation tiles. The weights of hazard-aware's objective are varied one at a time on the
 tuning tiles, as changing them is tuning. The front holds the policies that see no truth and that no other of
-them beats in both. The ceiling and the floor are `hindsight`'s: the share of episodes in which any policy
+them beats in both. The ceiling and the floor are `hindsight`'s: the ratio of episodes in which any policy
 could have known safe ground, and the propellant without which none can land there softly.
 """
 

@@ -44,7 +44,7 @@ class Bounds:
     Attributes:
         preset: name.
         episodes: number of episodes.
-        ceiling: share of episodes in which safe ground could have been known, with Wilson's interval.
+        ceiling: ratio of episodes in which safe ground could have been known, with Wilson's interval.
         floor: mean least propellant [%] with Student's interval.
     """
 

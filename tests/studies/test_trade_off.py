@@ -1,6 +1,7 @@
 """The trade-off study: the front, the sweep of the weights, the files."""
 
 import csv
+import json
 from pathlib import Path
 
 import numpy as np
@@ -117,6 +118,16 @@ def test_policies_fly_validation_and_weights_fly_tuning(out: Path) -> None:
     assert [line["value"] for line in lines if line["weight"] == "commit_time"] == ["0.5", "7.5"]
     assert not any(line["on_front"] == "True" for line in lines if line["policy"] == "oracle")
     assert any(line["on_front"] == "True" for line in lines if line["policy"] == "single-divert")
+
+
+def test_every_point_leaves_its_rows_and_where_they_come_from(out: Path) -> None:
+    assert json.loads((out / "provenance.json").read_text())["options"]["sweep_episodes"] == 2
+    for label, lines in (("paper/policies", 3 * 10), ("paper/weights", 3 * 2)):
+        with (out / label / "episodes.csv").open() as stream:
+            assert len(list(csv.DictReader(stream))) == lines
+        told = json.loads((out / label / "provenance.json").read_text())
+        assert told["study"]["split"] == ("validation" if label == "paper/policies" else "tuning")
+        assert sum(session["episodes"] for session in told["flight"]["sessions"]) == lines // 3
 
 
 def test_no_policy_beats_the_bounds(out: Path) -> None:

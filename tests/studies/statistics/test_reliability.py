@@ -16,8 +16,8 @@ from studies.statistics.reliability import (
 
 
 @pytest.mark.parametrize(
-    ("share", "confidence", "failures", "episodes"),
-    [  # Hanson and Beard 2010; the first column is ln(risk) / ln(share), rounded up
+    ("reliability", "confidence", "failures", "episodes"),
+    [  # Hanson and Beard 2010; the first column is ln(risk) / ln(reliability), rounded up
         (0.99, 0.9, 0, 230),
         (0.99, 0.9, 1, 388),
         (0.99, 0.9, 2, 531),
@@ -31,10 +31,10 @@ from studies.statistics.reliability import (
         (0.999, 0.95, 0, 2995),
     ],
 )
-def test_known_sample_sizes(share: float, confidence: float, failures: int, episodes: int) -> None:
-    assert needed_episodes(share, confidence, failures) == episodes
-    assert allowed_failures(episodes, share, confidence) == failures
-    before = allowed_failures(episodes - 1, share, confidence)
+def test_known_sample_sizes(reliability: float, confidence: float, failures: int, episodes: int) -> None:
+    assert needed_episodes(reliability, confidence, failures) == episodes
+    assert allowed_failures(episodes, reliability, confidence) == failures
+    before = allowed_failures(episodes - 1, reliability, confidence)
     assert before == (failures - 1 if failures else None)
 
 
@@ -62,7 +62,7 @@ def test_the_exact_interval_covers_at_least_what_it_says(episodes: int, ratio: f
 
 @pytest.mark.parametrize(("episodes", "ratio"), [(20, 0.9), (300, 0.98), (1000, 0.9973)])
 def test_the_lower_bound_holds_as_often_as_it_says(episodes: int, ratio: float) -> None:
-    """Summed over every count with its probability; it is also the share that so many failures still show."""
+    """Summed over every count with its probability; also the reliability that so many failures still show."""
     from scipy.stats import binom
 
     bounds = [exact_lower_bound(hits, episodes, 0.9) for hits in range(episodes + 1)]
@@ -75,12 +75,12 @@ def test_the_lower_bound_holds_as_often_as_it_says(episodes: int, ratio: float) 
 
 
 def test_order_bounds_cover_as_they_say() -> None:
-    """4000 samples of 600: the share of bounds above the true quantile strays by 5 errors of 0.5 %."""
+    """4000 samples of 600: the ratio of bounds above the true quantile strays by 5 errors of 0.5 %."""
     rng = np.random.default_rng(4)
     held = 0
     reached = 0.0
     for _ in range(4000):
-        bound = order_bound(rng.exponential(size=600), share=0.99, confidence=0.9)
+        bound = order_bound(rng.exponential(size=600), reliability=0.99, confidence=0.9)
         held += bound.value >= -np.log(0.01)
         reached = bound.confidence
     assert reached >= 0.9
@@ -89,7 +89,7 @@ def test_order_bounds_cover_as_they_say() -> None:
 
 @given(values=st.lists(st.floats(allow_nan=False), min_size=45, max_size=200))
 def test_so_many_values_lie_above_the_bound(values: list[float]) -> None:
-    bound = order_bound(values, share=0.95)
+    bound = order_bound(values, reliability=0.95)
     assert bound.value in values
     assert sum(value > bound.value for value in values) <= bound.exceeded
     assert sorted(values)[len(values) - 1 - bound.exceeded] == bound.value
@@ -106,8 +106,8 @@ def test_too_few_values_say_how_many_it_takes() -> None:
     [
         (lambda: order_bound([1.0, float("nan")]), "without NaN"),
         (lambda: order_bound([]), "non-empty"),
-        (lambda: order_bound(np.zeros(900), share=1.0), "share must be below 1"),
-        (lambda: needed_episodes(0.0), "share"),
+        (lambda: order_bound(np.zeros(900), reliability=1.0), "reliability must be below 1"),
+        (lambda: needed_episodes(0.0), "reliability"),
         (lambda: needed_episodes(0.9, confidence=1.0), "confidence"),
         (lambda: needed_episodes(0.9, failures=-1), "failures"),
         (lambda: allowed_failures(0, 0.9), "episodes"),

@@ -5,7 +5,6 @@ stream is seeded, so a run repeats. Where the distribution can be summed it is, 
 """
 
 import math
-import tracemalloc
 from fractions import Fraction
 
 import numpy as np
@@ -16,7 +15,6 @@ from scipy.stats import binom, binomtest
 
 from studies.statistics.ratios import (
     Interval,
-    bootstrap_mean,
     clustered_interval,
     least_passing,
     mcnemar_p_value,
@@ -204,68 +202,6 @@ def test_one_tile_says_nothing_of_others():
     assert clustered_interval([True, True, False], [7, 7, 7]) == Interval(2 / 3, 0.0, 1.0)
 
 
-# ---- bootstrap
-
-
-def test_bootstrap_coverage():
-    """Normal values, 100 of them: the percentile bootstrap covers 94.5 % for 95 %."""
-    rng, repeats = np.random.default_rng(4), 3000
-    covered = np.mean(
-        [covers(bootstrap_mean(rng.normal(3.0, 2.0, 100), rng, resamples=600), 3.0) for _ in range(repeats)]
-    )
-    assert gate(float(covered), 0.94, repeats)
-    assert covered < 0.98
-
-
-@pytest.mark.parametrize("confidence", [0.5, 0.9, 0.95, 0.99])
-def test_bootstrap_of_many_values_is_the_normal_interval(confidence):
-    rng = np.random.default_rng(5)
-    values = rng.exponential(size=2000)
-    interval = bootstrap_mean(values, rng, confidence, resamples=8000)
-    from scipy.special import ndtri
-
-    half = ndtri(0.5 + confidence / 2.0) * values.std() / math.sqrt(values.size)
-    assert interval.estimate == values.mean()
-    # a quantile of 8000 resamples is uncertain by about 2 % of a standard error; 5 % at the 0.995 quantile
-    tolerance = 0.15 * values.std() / math.sqrt(values.size)
-    assert interval.low == pytest.approx(values.mean() - half, abs=tolerance)
-    assert interval.high == pytest.approx(values.mean() + half, abs=tolerance)
-
-
-@settings(max_examples=50)
-@given(
-    values=st.lists(st.floats(-1e3, 1e3), min_size=2, max_size=40),
-    seed=st.integers(0, 2**32),
-    shift=st.floats(-1e3, 1e3),
-    scale=st.floats(0.1, 10.0),
-)
-def test_bootstrap_follows_shift_and_scale_and_repeats(values, seed, shift, scale):
-    sample = np.array(values)
-    one = bootstrap_mean(sample, np.random.default_rng(seed), resamples=200)
-    again = bootstrap_mean(sample, np.random.default_rng(seed), resamples=200)
-    moved = bootstrap_mean(scale * sample + shift, np.random.default_rng(seed), resamples=200)
-    assert one == again
-    assert sample.min() - 1e-9 <= one.low <= one.high <= sample.max() + 1e-9
-    for end in ("estimate", "low", "high"):
-        assert getattr(moved, end) == pytest.approx(scale * getattr(one, end) + shift, abs=1e-8)
-
-
-def test_bootstrap_of_equal_values_and_of_one():
-    rng = np.random.default_rng(6)
-    assert bootstrap_mean([2.5, 2.5, 2.5], rng) == Interval(2.5, 2.5, 2.5)
-    assert bootstrap_mean([2.5], rng) == Interval(2.5, -math.inf, math.inf)
-
-
-def test_bootstrap_memory_is_bounded():
-    values = np.arange(100_000, dtype=float)
-    rng = np.random.default_rng(7)
-    tracemalloc.start()
-    bootstrap_mean(values, rng, resamples=100)
-    peak = tracemalloc.get_traced_memory()[1]
-    tracemalloc.stop()
-    assert peak < 40e6  # all the draws at once would take 120 MB
-
-
 # ---- McNemar
 
 
@@ -384,12 +320,6 @@ def test_power_grows_with_the_drop_and_the_episodes():
         ("success", lambda: clustered_interval([1.0, math.nan], [0, 1])),
         ("tile", lambda: clustered_interval([True, False], [0])),
         ("confidence", lambda: clustered_interval([True, False], [0, 1], 95.0)),
-        ("values", lambda: bootstrap_mean([], np.random.default_rng(0))),
-        ("values", lambda: bootstrap_mean([[1.0]], np.random.default_rng(0))),
-        ("values", lambda: bootstrap_mean([1.0, math.nan], np.random.default_rng(0))),
-        ("values", lambda: bootstrap_mean([1.0, math.inf], np.random.default_rng(0))),
-        ("confidence", lambda: bootstrap_mean([1.0, 2.0], np.random.default_rng(0), -0.5)),
-        ("resamples", lambda: bootstrap_mean([1.0, 2.0], np.random.default_rng(0), resamples=0)),
         ("first", lambda: mcnemar_p_value([2, 0], [1, 0])),
         ("second", lambda: mcnemar_p_value([True, False], [math.nan, 0.0])),
         ("second", lambda: mcnemar_p_value([True, False], [True])),
