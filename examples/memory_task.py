@@ -57,7 +57,7 @@ def mean_reward(agent: RecurrentTD3) -> float:
 SETTINGS = Hyperparameters(
     plus=True,
     memory=16,
-    head=(32,),
+    hidden=(32,),
     batch_size=32,
     random_steps=400,
     update_every=2,

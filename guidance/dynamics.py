@@ -95,12 +95,12 @@ def propagate(
         ValueError: an argument is not finite or of the wrong shape, or all mass would be burnt.
     """
     force = finite_vector("thrust", thrust, 3)
-    pull = finite_vector("gravity", gravity, 3)
+    g = finite_vector("gravity", gravity, 3)
     time = finite_number("duration", duration, at_least=0.0)
     if float(np.linalg.norm(force)) / lander.exhaust_velocity * time >= state.mass:
         raise ValueError(f"duration {time:g} s burns more than the whole mass {state.mass:g} kg")
     out = np.empty(7)
-    propagate_into(state.as_array(), force, time, pull, lander.exhaust_velocity, out)
+    propagate_into(state.as_array(), force, time, g, lander.exhaust_velocity, out)
     return State(out[:3], out[3:6], float(out[6]))
 
 
@@ -131,12 +131,12 @@ def integrate(
 
     if times.ndim != 1 or times.size < 2 or not np.isfinite(times).all() or not (np.diff(times) > 0.0).all():
         raise ValueError("times must be finite and strictly increasing, at least two")
-    pull = finite_vector("gravity", gravity, 3)
+    g = finite_vector("gravity", gravity, 3)
 
     def rate(time: float, y: Array) -> Array:
         force = thrust_at(time)
         flow = float(np.linalg.norm(force)) / lander.exhaust_velocity
-        return np.concatenate([y[3:6], force / y[6] + pull, [-flow]])
+        return np.concatenate([y[3:6], force / y[6] + g, [-flow]])
 
     path = np.empty((times.size, 7))
     path[0] = state.as_array()

@@ -41,7 +41,12 @@ def source_hash() -> str:
 
 
 def compile_kernel(function: Function, *, parallel: bool = False) -> Function:
-    """Compile a function on first call, without the GIL; cached on disk where that is possible."""
+    """Compile a function on first call, without the GIL; cached on disk where that is possible.
+
+    With numba's own switch `NUMBA_DISABLE_JIT=1` it stays Python, for a debugger or a count of covered lines.
+    """
+    if _numba_config.DISABLE_JIT:
+        return function
     compiled = numba.njit(nogil=True, parallel=parallel)(function)
     before = _numba_config.CACHE_DIR
     try:

@@ -11,6 +11,7 @@ differences between sites, which choose among them, are good to a few percent un
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -26,33 +27,51 @@ _SHORTEST, _LONGEST = 0.2, 1.5  # times of flight searched, in free falls to the
 _SECTIONS = 22  # of the golden section: 1e-4 of the interval
 
 
+class Approach(NamedTuple):
+    """What the price of a site depends on, but for where it is.
+
+    Attributes:
+        velocity_east: [m/s] at the start.
+        velocity_north: [m/s] at the start.
+        velocity_up: [m/s] at the start.
+        gravity: [m/s^2] size of the downward gravity.
+        thrust_acceleration: [m/s^2] greatest, at the start mass.
+    """
+
+    velocity_east: float
+    velocity_north: float
+    velocity_up: float
+    gravity: float
+    thrust_acceleration: float
+
+
 @compile_kernel
-def _cost(east: float, north: float, up: float, motion: Array, time: float) -> float:
-    """[m/s] at one time of flight; `motion` is (velocity (3), pull, greatest acceleration)."""
-    vx, vy, vz, pull, push = motion
+def _cost(east: float, north: float, up: float, approach: Approach, time: float) -> float:
+    """[m/s] at one time of flight to an offset [m]."""
+    vx, vy, vz, g, thrust = approach
     first_x, first_y = east / time, north / time
-    first_z = (up + 0.5 * pull * time * time) / time
+    first_z = (up + 0.5 * g * time * time) / time
     first = math.sqrt((first_x - vx) ** 2 + (first_y - vy) ** 2 + (first_z - vz) ** 2)
-    last = math.sqrt(first_x**2 + first_y**2 + (first_z - pull * time) ** 2)
-    return first + last + 0.5 * (pull * last / push + first * first / (push * time))
+    last = math.sqrt(first_x**2 + first_y**2 + (first_z - g * time) ** 2)
+    return first + last + 0.5 * (g * last / thrust + first * first / (thrust * time))
 
 
 @compile_kernel
-def least_cost(east: float, north: float, up: float, motion: Array) -> tuple[float, float]:
-    """(velocity change [m/s], time of flight [s]) of the cheapest two-impulse landing at an offset [m]."""
-    sink, pull = motion[2], motion[3]
-    fall = (sink + math.sqrt(max(sink * sink - 2.0 * pull * up, 0.0))) / pull
+def least_cost(east: float, north: float, up: float, approach: Approach) -> float:
+    """[m/s] of the cheapest two-impulse landing at an offset [m] from the start."""
+    climb, g = approach.velocity_up, approach.gravity
+    fall = (climb + math.sqrt(max(climb * climb - 2.0 * g * up, 0.0))) / g
     bracket = divide(_SHORTEST * fall, _LONGEST * fall)
-    at_first = _cost(east, north, up, motion, bracket.first)
-    at_second = _cost(east, north, up, motion, bracket.second)
+    at_first = _cost(east, north, up, approach, bracket.first)
+    at_second = _cost(east, north, up, approach, bracket.second)
     for _ in range(_SECTIONS):
         if at_first < at_second:
             bracket, at_second = keep_lower(bracket), at_first
-            at_first = _cost(east, north, up, motion, bracket.first)
+            at_first = _cost(east, north, up, approach, bracket.first)
         else:
             bracket, at_first = keep_upper(bracket), at_second
-            at_second = _cost(east, north, up, motion, bracket.second)
-    return (at_first, bracket.first) if at_first < at_second else (at_second, bracket.second)
+            at_second = _cost(east, north, up, approach, bracket.second)
+    return at_first if at_first < at_second else at_second
 
 
 @compile_kernel
@@ -60,12 +79,12 @@ def _fill(
     east: Array,
     north: Array,
     up: float,
-    motion: Array,
+    approach: Approach,
     out: Array,
 ) -> None:
     for row in range(north.size):
         for column in range(east.size):
-            out[row, column] = least_cost(east[column], north[row], up, motion)[0]
+            out[row, column] = least_cost(east[column], north[row], up, approach)
 
 
 def divert_cost(
@@ -92,13 +111,14 @@ def divert_cost(
     Raises:
         ValueError: the state is not above the plane, or gravity does not point along -z.
     """
-    pull = finite_vector("gravity", gravity, 3)
-    if pull[0] != 0.0 or pull[1] != 0.0 or pull[2] >= 0.0:
-        raise ValueError(f"gravity must point along -z, got {pull.tolist()}")
+    g = finite_vector("gravity", gravity, 3)
+    if g[0] != 0.0 or g[1] != 0.0 or g[2] >= 0.0:
+        raise ValueError(f"gravity must point along -z, got {g.tolist()}")
     if state.position[2] <= plane:
         raise ValueError(f"state: altitude {state.position[2]:g} m must be above the plane, {plane:g} m")
-    motion = np.array([*state.velocity, -pull[2], lander.max_thrust / state.mass])
+    vx, vy, vz = (float(v) for v in state.velocity)
+    approach = Approach(vx, vy, vz, -float(g[2]), lander.max_thrust / state.mass)
     out = np.empty((north.size, east.size))
     x, y, z = state.position
-    _fill(np.asarray(east - x), np.asarray(north - y), float(plane - z), motion, out)
+    _fill(np.asarray(east - x), np.asarray(north - y), float(plane - z), approach, out)
     return state.mass * -np.expm1(-out / lander.exhaust_velocity)

@@ -75,5 +75,5 @@ def _undisturbed_flights(state: State, target: Array, times: Array, gravity: Arr
     miss = 6.0 * (target - state.position) / t**2
     start = miss - 4.0 * state.velocity / t - gravity
     end = -miss + 2.0 * state.velocity / t - gravity
-    share = np.linspace(0.0, 1.0, _INSTANTS)[:, None]
-    return start[:, None] * (1.0 - share) + end[:, None] * share
+    fraction = np.linspace(0.0, 1.0, _INSTANTS)[:, None]
+    return start[:, None] * (1.0 - fraction) + end[:, None] * fraction

@@ -15,6 +15,7 @@ prints it with |g|^2 in front of t^4, which is W = |g|^2/2 and not, as it says, 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -26,6 +27,17 @@ from guidance.lander import Lander
 from guidance.state import State
 from guidance.thrust_limits import limit_into, pointing_angle
 from guidance.validation import finite_number, finite_vector
+
+
+class ZemZevGains(NamedTuple):
+    """Gains of the acceleration command: position_gain is K_R, velocity_gain K_V, without unit."""
+
+    position_gain: float
+    velocity_gain: float
+
+
+ENERGY_OPTIMAL = ZemZevGains(6.0, 2.0)
+"""They minimise the integral of |a|^2/2."""
 
 
 @compile_kernel
@@ -114,13 +126,19 @@ def zem_zev_into(
     gravity: Array,
     out: Array,
 ) -> None:
-    """Write the commanded thrust acceleration [m/s^2] for a landing at rest into `out` (3,)."""
+    """Write the commanded thrust acceleration [m/s^2] for a landing at rest into `out` (3,).
+
+    `gains` are `ZemZevGains`, or a plain (K_R, K_V).
+    """
+    position_gain, velocity_gain = gains
     for axis in range(3):
         v = state[3 + axis]
         g = gravity[axis]
         miss = target[axis] - state[axis] - v * time_to_go - 0.5 * g * time_to_go * time_to_go
         velocity_miss = -v - g * time_to_go
-        out[axis] = gains[0] * miss / (time_to_go * time_to_go) - gains[1] * velocity_miss / time_to_go
+        out[axis] = (
+            position_gain * miss / (time_to_go * time_to_go) - velocity_gain * velocity_miss / time_to_go
+        )
 
 
 def quartic_fourth_power(gravity: Array, time_weight: float | None) -> float:
@@ -160,13 +178,13 @@ def time_to_go(
     Raises:
         ValueError: an argument is not finite or of the wrong shape, or gravity and weight are both zero.
     """
-    pull = finite_vector("gravity", gravity, 3)
+    g = finite_vector("gravity", gravity, 3)
     return solve_time_to_go(
         state.position,
         state.velocity,
         finite_vector("target", target, 3),
         finite_vector("target_velocity", target_velocity, 3),
-        quartic_fourth_power(pull, time_weight),
+        quartic_fourth_power(g, time_weight),
     )
 
 
@@ -174,7 +192,7 @@ def zem_zev_acceleration(
     state: State,
     target: ArrayLike,
     time_to_go: float,
-    gains: tuple[float, float] = (6.0, 2.0),
+    gains: tuple[float, float] = ENERGY_OPTIMAL,
     gravity: ArrayLike = MOON_GRAVITY,
     target_velocity: ArrayLike = (0.0, 0.0, 0.0),
 ) -> Array:
@@ -184,7 +202,7 @@ def zem_zev_acceleration(
         state: present state.
         target: [m] shape (3,).
         time_to_go: [s] above zero.
-        gains: (K_R, K_V); 6 and 2 minimise the integral of |a|^2/2.
+        gains: (K_R, K_V), as `ZemZevGains`; 6 and 2 minimise the integral of |a|^2/2.
         gravity: [m/s^2] shape (3,).
         target_velocity: [m/s] shape (3,), v_f; rest unless given.
 
@@ -194,19 +212,19 @@ def zem_zev_acceleration(
     Raises:
         ValueError: an argument is not finite or of the wrong shape, or the time to go is not positive.
     """
-    position_gain, velocity_gain = finite_vector("gains", gains, 2)
+    chosen = ZemZevGains(*finite_vector("gains", gains, 2).tolist())
     time = finite_number("time_to_go", time_to_go, above=0.0)
     arrival = finite_vector("target_velocity", target_velocity, 3)
     out = np.empty(3)
     zem_zev_into(
         state.as_array(),
         finite_vector("target", target, 3),
-        (float(position_gain), float(velocity_gain)),
+        chosen,
         time,
         finite_vector("gravity", gravity, 3),
         out,
     )
-    return out - velocity_gain / time * arrival  # the kernel knows no velocity at the target
+    return out - chosen.velocity_gain / time * arrival  # the kernel knows no velocity at the target
 
 
 def saturate_thrust(thrust: ArrayLike, lander: Lander) -> Array:

@@ -15,46 +15,77 @@ WITH_MEMORY = ("td3-lstm", "td3-lstm-plus")
 
 
 @dataclass(frozen=True)
-class AgentSettings:
+class OffPolicySettings:
+    """What every off-policy algorithm asks for.
+
+    Attributes:
+        hidden: sizes of the hidden layers of every network.
+        batch_size: transitions per update.
+        discount: gamma.
+        target_rate: tau, of the target networks.
+        exploration_noise: standard deviation of the noise on actions in [-1, 1] (deterministic actors only).
+        smoothing_noise: standard deviation of the noise on the target actor's actions, clipped at 2.5 of it
+            (td3 and those with memory).
+        random_steps: steps with uniform actions before the first update.
+        replay_size: transitions kept.
+    """
+
+    hidden: tuple[int, ...] = (256, 256)
+    batch_size: int = 256
+    discount: float = 0.99
+    target_rate: float = 0.005
+    exploration_noise: float = 0.1
+    smoothing_noise: float = 0.05
+    random_steps: int = 25_000
+    replay_size: int = 400_000
+
+
+@dataclass(frozen=True)
+class SequenceSettings(OffPolicySettings):
+    """What learning from sequences asks for; `batch_size` counts sequences, `hidden` joins the branches.
+
+    Attributes:
+        memory: hidden size of each LSTM.
+        update_every: environment steps for one update, which learns from whole sequences.
+        window: longest sequence of td3-lstm-plus; longer episodes give windows of that many transitions.
+        burn_in: transitions before a window that only fill the memory.
+    """
+
+    hidden: tuple[int, ...] = (256,)
+    batch_size: int = 32
+    smoothing_noise: float = 0.2
+    random_steps: int = 20_000
+    replay_size: int = 200_000
+    memory: int = 128
+    update_every: int = 1
+    window: int = 20
+    burn_in: int = 0
+
+
+@dataclass(frozen=True)
+class AgentSettings(OffPolicySettings):
     """Everything that decides what is learnt, but for the seed and the number of steps.
 
     Attributes:
         algorithm: which one.
         layout: observation vector (a name in `rl.environment.encoding.LAYOUTS`).
-        hidden: sizes of the hidden layers of every network.
         learning_rate: of Adam, until the decay begins.
         final_learning_rate: where the decay ends.
         learning_rate_decay: steps at which its linear decay begins and ends.
-        batch_size: transitions per update.
-        discount: gamma.
-        target_rate: tau, of the target networks.
-        exploration_noise: standard deviation of the noise on actions (deterministic actors only).
-        smoothing_noise: standard deviation of the noise on the target actor's actions, clipped at 2.5 of it
-            (td3 and those with memory).
         control_prior_weight: of the actor's penalty that draws the gains and the clock to their nominal
             values (td3 and those with memory; see `rl.learning.td3.FastTD3`).
         control_prior_step: environment step from which it holds: first free, then settled.
-        random_steps: steps with uniform actions before the first update.
-        replay_size: transitions kept.
         matmul_precision: "highest" is float32; "medium" lets the processor multiply in bfloat16 where it can.
         shift: the target moves by at most this share of the look's width in one decision.
     """
 
     algorithm: AlgorithmName = "td3"
     layout: str = CURVED.name
-    hidden: tuple[int, ...] = (256, 256)
     learning_rate: float = 3e-4
     final_learning_rate: float = 3e-5
     learning_rate_decay: tuple[int, int] = (190_000, 250_000)
-    batch_size: int = 256
-    discount: float = 0.99
-    target_rate: float = 0.005
-    exploration_noise: float = 0.1
-    smoothing_noise: float = 0.05
     control_prior_weight: float = 0.2
     control_prior_step: int = 165_000
-    random_steps: int = 25_000
-    replay_size: int = 400_000
     matmul_precision: Literal["highest", "high", "medium"] = "medium"
     shift: float = 0.25
 
@@ -75,28 +106,12 @@ class AgentSettings:
 
 
 @dataclass(frozen=True)
-class RecurrentSettings(AgentSettings):
-    """Settings of an agent with memory; `batch_size` counts sequences, `hidden` joins the branches.
-
-    Attributes:
-        memory: hidden size of each LSTM.
-        update_every: environment steps for one update, which learns from whole sequences.
-        window: longest sequence of td3-lstm-plus.
-        burn_in: transitions before a window that only fill the memory.
-    """
+class RecurrentSettings(SequenceSettings, AgentSettings):
+    """Settings of an agent with memory."""
 
     algorithm: AlgorithmName = "td3-lstm"
-    hidden: tuple[int, ...] = (256,)
     learning_rate_decay: tuple[int, int] = (85_000, 115_000)
-    batch_size: int = 32
-    smoothing_noise: float = 0.2
     control_prior_step: int = 80_000
-    random_steps: int = 20_000
-    replay_size: int = 200_000
-    memory: int = 128
-    update_every: int = 1
-    window: int = 20
-    burn_in: int = 0
 
 
 TD3_SETTINGS = AgentSettings()

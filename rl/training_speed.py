@@ -85,6 +85,7 @@ def measure_training_speed(options: TrainingSpeed) -> dict[str, float]:
     import torch
     from stable_baselines3 import TD3
 
+    from rl.learning.precision import matmul_precision
     from rl.learning.td3 import FastTD3
 
     torch.set_num_threads(1)
@@ -95,15 +96,13 @@ def measure_training_speed(options: TrainingSpeed) -> dict[str, float]:
         "bfloat16 products": (fast, "medium"),
     }
     times: dict[str, list[float]] = {name: [] for name in cases}
-    before = torch.get_float32_matmul_precision()
     for _ in range(options.rounds):
         for name, (model, precision) in cases.items():
-            torch.set_float32_matmul_precision(precision)
-            model.train(4, options.batch_size)
-            started = clock.process_time()
-            model.train(options.updates, options.batch_size)
-            times[name].append((clock.process_time() - started) / options.updates)
-    torch.set_float32_matmul_precision(before)
+            with matmul_precision(precision):
+                model.train(4, options.batch_size)
+                started = clock.process_time()
+                model.train(options.updates, options.batch_size)
+                times[name].append((clock.process_time() - started) / options.updates)
     return {name: 1.0 / float(np.median(values)) for name, values in times.items()}
 
 
@@ -131,21 +130,21 @@ def measure_memory_speed(options: TrainingSpeed) -> dict[str, UpdateRate]:
     """Updates a second of td3-lstm and td3-lstm-plus, in float32 and with bfloat16 products."""
     import torch
 
+    from rl.learning.precision import matmul_precision
+
     torch.set_num_threads(1)
     agents = {name: _filled_with_sequences(name, options) for name in ("td3-lstm", "td3-lstm-plus")}
     precisions = {"float32": "highest", "bfloat16": "medium"}
     times: dict[str, list[tuple[float, float]]] = {}
-    before = torch.get_float32_matmul_precision()
     for _ in range(options.rounds):
         for name, agent in agents.items():
             for kind, precision in precisions.items():
-                torch.set_float32_matmul_precision(precision)
-                agent.train(2)
-                started = clock.process_time(), clock.perf_counter()
-                agent.train(options.updates)
-                spent = clock.process_time() - started[0], clock.perf_counter() - started[1]
+                with matmul_precision(precision):
+                    agent.train(2)
+                    started = clock.process_time(), clock.perf_counter()
+                    agent.train(options.updates)
+                    spent = clock.process_time() - started[0], clock.perf_counter() - started[1]
                 times.setdefault(f"{name} {kind}", []).append(spent)
-    torch.set_float32_matmul_precision(before)
     medians = {name: np.median(values, axis=0) / options.updates for name, values in times.items()}
     return {name: UpdateRate(*(1.0 / float(value) for value in spent)) for name, spent in medians.items()}
 
@@ -188,16 +187,16 @@ def measure_products(size: int = 1024, rounds: int = 20, precision: str = "highe
     """
     import torch
 
+    from rl.learning.precision import matmul_precision
+
     torch.set_num_threads(1)
-    before = torch.get_float32_matmul_precision()
-    torch.set_float32_matmul_precision(precision)
     a, b = torch.ones(size, size), torch.ones(size, size)
     times = []
-    for _ in range(rounds):
-        started = clock.process_time()
-        torch.mm(a, b)
-        times.append(clock.process_time() - started)
-    torch.set_float32_matmul_precision(before)
+    with matmul_precision(precision):
+        for _ in range(rounds):
+            started = clock.process_time()
+            torch.mm(a, b)
+            times.append(clock.process_time() - started)
     return 2.0 * size**3 / float(np.median(times))
 
 

@@ -39,10 +39,10 @@ def burnt_mass(layout: CondensedLayout, scaled: ScaledProblem) -> Rows:
 def _moment_entries(layout: CondensedLayout) -> tuple[Index, Index, Array]:
     """What each node's thrust acceleration adds to position and velocity at the end."""
     n, h = layout.nodes, 1.0 / (layout.nodes - 1)
-    left = 1.0 - h * np.arange(1, n)  # time left after each interval
+    remaining = 1.0 - h * np.arange(1, n)  # after each interval
     to_position, to_velocity = np.zeros(n), np.zeros(n)
-    to_position[:-1] += h * h / 3.0 + 0.5 * h * left
-    to_position[1:] += h * h / 6.0 + 0.5 * h * left
+    to_position[:-1] += h * h / 3.0 + 0.5 * h * remaining
+    to_position[1:] += h * h / 6.0 + 0.5 * h * remaining
     to_velocity[:-1] += 0.5 * h
     to_velocity[1:] += 0.5 * h
     column = np.concatenate([layout.acceleration.T.ravel()] * 2)

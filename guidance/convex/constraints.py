@@ -45,7 +45,7 @@ class Rows:
     value_power: Array = field(default_factory=lambda: np.zeros(1))
     bound_rate: Array = field(default_factory=lambda: np.zeros(1))
 
-    def left_over(self, decision: Array) -> Array:
+    def slack_of(self, decision: Array) -> Array:
         """Slack b - A x, shape (cones, cone_size) (one cone for 'zero' and 'nonnegative')."""
         out = self.bound.copy()
         np.subtract.at(out, self.row, self.value * decision[self.column])
@@ -53,7 +53,7 @@ class Rows:
 
     def violation(self, decision: Array) -> float:
         """How far b - A x lies outside the cones; inside an inequality: minus the margin."""
-        rest = self.left_over(decision)
+        rest = self.slack_of(decision)
         if self.cone == "zero":
             return float(np.abs(rest).max())
         if self.cone == "nonnegative":
@@ -108,8 +108,8 @@ def motion(layout: Layout, scaled: ScaledProblem) -> Rows:
     """Exact motion between nodes under a thrust acceleration linear in time, and the burnt log-mass."""
     intervals = layout.nodes - 1
     h = 1.0 / intervals
-    pull = np.concatenate([scaled.gravity * (h * h / 2.0), scaled.gravity * h, [0.0]])
-    return Rows("motion", "zero", 7, bound=np.tile(pull, intervals), **_motion_entries(layout))
+    fall = np.concatenate([scaled.gravity * (h * h / 2.0), scaled.gravity * h, [0.0]])
+    return Rows("motion", "zero", 7, bound=np.tile(fall, intervals), **_motion_entries(layout))
 
 
 def landing(layout: Layout, scaled: ScaledProblem) -> Rows:

@@ -25,13 +25,13 @@ class FarkasProof:
         time: [s] time of flight.
         rows: the constraints, b - A x in their cones.
         multipliers: y, shape (m,), over the rows in their order.
-        reach: X, bound on the magnitude of every unknown.
+        unknown_bound: X, bound on the magnitude of every unknown.
     """
 
     time: float
     rows: list[Rows]
     multipliers: Array
-    reach: float
+    unknown_bound: float
 
     def __post_init__(self) -> None:
         """Move the multipliers into the dual cones exactly: solvers keep them there only to rounding."""
@@ -56,7 +56,7 @@ class FarkasProof:
         for part, y in self._pieces(self.multipliers):
             np.add.at(remainder, part.column, part.value * y[part.row])
             descent -= float(part.bound @ y)
-        doubt = float(np.abs(remainder).sum()) * self.reach
+        doubt = float(np.abs(remainder).sum()) * self.unknown_bound
         scale = abs(descent) + doubt
         return (descent - doubt) / scale if np.isfinite(scale) and scale > 0.0 else float("nan")
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -63,7 +64,7 @@ class ConvexSolution:
         return self.scaled.kappa * self.answer.primal[self.layout.log_mass]
 
     @property
-    def propellant_share(self) -> float:
+    def log_mass_ratio(self) -> float:
         """ln(start mass / final mass)."""
         return -float(self.log_mass[-1])
 
@@ -82,6 +83,15 @@ class ConvexSolution:
         thrust = primal[layout.acceleration] * scaled.acceleration * mass[:, None]
         time = np.linspace(0.0, scaled.time, layout.nodes)
         return Trajectory(time, position, velocity, mass, thrust, problem.lander.exhaust_velocity)
+
+
+class _Timed(NamedTuple):
+    """A part of the rows that depends on the time of flight: its number, its first row, and what depends."""
+
+    part: int
+    first_row: int
+    values_move: bool
+    bounds_move: bool
 
 
 class ConvexTemplate:
@@ -107,8 +117,11 @@ class ConvexTemplate:
         for family in _CONSTANT_FAMILIES.intersection(self._families):
             self._constant[family] = family(self.layout, nominal)
         self._assembly = Assembly(rows, self.cost(False), tolerance)
-        moves = [(bool(part.value_power.any()), bool(part.bound_rate.any())) for part in rows]
-        self._timed = [(k, int(self._assembly.first[k]), *move) for k, move in enumerate(moves) if any(move)]
+        timed = [
+            _Timed(k, int(first), bool(part.value_power.any()), bool(part.bound_rate.any()))
+            for k, (part, first) in enumerate(zip(rows, self._assembly.first, strict=False))
+        ]
+        self._timed = [part for part in timed if part.values_move or part.bounds_move]
 
     def rows(self, scaled: ScaledProblem) -> list[Rows]:
         """Constraint rows for given numbers."""
@@ -143,13 +156,13 @@ class ConvexTemplate:
     def _sensitivity(self, rows: list[Rows], answer: ConicAnswer) -> float:
         """T d(optimum)/dT at fixed units: dual' (T dA/dT x - T db/dT), each number being a power of T."""
         total = 0.0
-        for index, first, value_moves, bound_moves in self._timed:
-            part = rows[index]
-            dual = answer.dual[first : first + part.bound.size]
-            if value_moves:
+        for timed in self._timed:
+            part = rows[timed.part]
+            dual = answer.dual[timed.first_row : timed.first_row + part.bound.size]
+            if timed.values_move:
                 weight = part.value_power * part.value * answer.primal[part.column]
                 total += float(dual[part.row] @ weight)
-            if bound_moves:
+            if timed.bounds_move:
                 total -= float((dual * part.bound_rate).sum())
         return total
 

@@ -80,16 +80,16 @@ class ScaledProblem:
         return self.acceleration * self.time**2
 
     @property
-    def reach(self) -> float:
+    def unknown_bound(self) -> float:
         """Bound on every scaled unknown of any flight within the thrust bounds (for certificates).
 
         All are reached from the start: the velocity at the end too, whatever is asked for.
         """
-        pull = float(np.linalg.norm(self.gravity))
-        push = float(
+        gravity = float(np.linalg.norm(self.gravity))
+        slack = float(
             np.max(self.mass_bounds.upper_bound + np.abs(self.mass_bounds.upper_slope) * self.propellant)
         )
-        speed = float(np.linalg.norm(self.velocity)) + pull + push
+        speed = float(np.linalg.norm(self.velocity)) + gravity + slack
         return 1.0 + float(np.linalg.norm(self.position)) + speed
 
 
@@ -100,9 +100,9 @@ def least_log_mass(problem: LandingProblem, time: float, nodes: int) -> Array:
     the trapezoidal rule of the mass equation, which burns a little more than the continuous engine can.
     """
     elapsed = np.linspace(0.0, time, nodes)
-    left = 1.0 - problem.lander.max_mass_flow / problem.state.mass * elapsed
+    remaining = 1.0 - problem.lander.max_mass_flow / problem.state.mass * elapsed
     dry = -problem.log_mass_ratio
-    burnt = np.log(np.maximum(left, 1e-3 * np.exp(dry)))
+    burnt = np.log(np.maximum(remaining, 1e-3 * np.exp(dry)))
     return np.maximum(1.02 * burnt, dry)
 
 

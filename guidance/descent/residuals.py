@@ -167,11 +167,11 @@ def _fly(
             total[:] = 0.0
             planned = 0.0
             for stage in range(4):
-                share = (part + 0.5 * ((stage + 1) // 2)) / _BETWEEN
+                fraction = (part + 0.5 * ((stage + 1) // 2)) / _BETWEEN
                 if stage != 2:
-                    planned = mass[k] * math.exp(share * (slope + bend * (1.0 - share)))
+                    planned = mass[k] * math.exp(fraction * (slope + bend * (1.0 - fraction)))
                 for axis in range(3):
-                    u = acceleration[k, axis] + share * (acceleration[k + 1, axis] - acceleration[k, axis])
+                    u = acceleration[k, axis] + fraction * (acceleration[k + 1, axis] - acceleration[k, axis])
                     rate[axis] = here[3 + axis]
                     rate[3 + axis] = u * planned
                 rate[6] = -_length(rate[3], rate[4], rate[5]) / exhaust_velocity

@@ -66,9 +66,9 @@ class Trajectory:
         step = self.time[1]
         at = np.clip(t / step, 0.0, self.nodes - 1.0)
         k = np.minimum(at.astype(np.int64), self.nodes - 2)
-        share = at - k
-        mass = self._mass_between(k, share)
-        weight = share[..., None]
+        fraction = at - k
+        mass = self._mass_between(k, fraction)
+        weight = fraction[..., None]
         thrust = mass[..., None] * ((1.0 - weight) * self.acceleration[k] + weight * self.acceleration[k + 1])
         after = t > self.time[-1] * (1.0 + 1e-12)
         return np.where(after[..., None], 0.0, thrust)
@@ -83,10 +83,10 @@ class Trajectory:
         """[1/s] share of the mass burnt per second at each node."""
         return np.linalg.norm(self.acceleration, axis=1) / self.exhaust_velocity
 
-    def _mass_between(self, k: Index, share: Array) -> Array:
+    def _mass_between(self, k: Index, fraction: Array) -> Array:
         """Mass in interval k: its logarithm is quadratic where the magnitude of acceleration is linear."""
-        bend = 0.5 * self.time[1] * (self._flow[k + 1] - self._flow[k]) * share * (1.0 - share)
-        return self.mass[k] * (self.mass[k + 1] / self.mass[k]) ** share * np.exp(bend)
+        bend = 0.5 * self.time[1] * (self._flow[k + 1] - self._flow[k]) * fraction * (1.0 - fraction)
+        return self.mass[k] * (self.mass[k + 1] / self.mass[k]) ** fraction * np.exp(bend)
 
 
 def no_trajectory() -> Trajectory:

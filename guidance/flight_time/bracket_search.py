@@ -8,7 +8,7 @@ by secants, or by halves where a secant ends on the same side twice. It takes a 
 
 from __future__ import annotations
 
-from guidance.flight_time.search import Solution, TimeSearch
+from guidance.flight_time.search import Solution, TimeSearch, nearest_to_optimum
 
 _FIRST_STEP = 0.02  # of the time; doubled at each step downhill
 _NEAR = 0.1  # of the time: where no sign has changed, the optimum is thought to lie no farther away
@@ -30,36 +30,30 @@ class BracketSearch(TimeSearch[Solution]):
             return None
         width = _FIRST_STEP
         while len(self.samples) < _MOST_STEPS:
-            left, right = self._nearest()
-            if left is not None and right is not None:
-                step = self._between(left, right)
+            inside = (s for s in self.samples if self.low <= s.time <= self.high)
+            falling, rising = nearest_to_optimum(inside)
+            if falling is not None and rising is not None:
+                step = self._between(falling, rising)
             else:
-                step = self._downhill(left, right, width)
+                step = self._downhill(falling, rising, width)
                 width *= 2.0
             if step is None:
                 break
             self.sample(step)
         return self.best
 
-    def _nearest(self) -> tuple[Solution | None, Solution | None]:
-        """The last solved sample of the falling side, and the first of the rising one."""
-        inside = [s for s in self.samples if s.solved and self.low <= s.time <= self.high]
-        falling, rising = [s for s in inside if s.slope < 0.0], [s for s in inside if s.slope >= 0.0]
-        left = max(falling, key=lambda s: s.time, default=None)
-        return left, min(rising, key=lambda s: s.time, default=None)
-
-    def _between(self, left: Solution, right: Solution) -> float | None:
+    def _between(self, falling: Solution, rising: Solution) -> float | None:
         """[s] the next time inside the bracket; None where slopes leave nothing to gain in it."""
-        gap, total = right.time - left.time, right.slope - left.slope
-        if gap * right.slope * -left.slope <= self._tolerance * total or gap <= 1e-6 * right.time:
+        gap, total = rising.time - falling.time, rising.slope - falling.slope
+        if gap * rising.slope * -falling.slope <= self._tolerance * total or gap <= 1e-6 * rising.time:
             return None
         last = [s.slope < 0.0 for s in self.samples[-2:] if s.solved]
-        share = 0.5 if len(last) == 2 and last[0] == last[1] else -left.slope / total
-        return left.time + gap * min(max(share, _MARGIN), 1.0 - _MARGIN)
+        fraction = 0.5 if len(last) == 2 and last[0] == last[1] else -falling.slope / total
+        return falling.time + gap * min(max(fraction, _MARGIN), 1.0 - _MARGIN)
 
-    def _downhill(self, left: Solution | None, right: Solution | None, width: float) -> float | None:
+    def _downhill(self, falling: Solution | None, rising: Solution | None, width: float) -> float | None:
         """[s] the next time where no sign has changed yet; None where slope and room leave no gain."""
-        here, end = (left, self.high) if left is not None else (right, self.low)
+        here, end = (falling, self.high) if falling is not None else (rising, self.low)
         if here is None:
             return None
         room = abs(end - here.time)

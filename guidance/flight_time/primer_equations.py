@@ -22,91 +22,74 @@ import math
 import numpy as np
 
 from guidance.arrays import Array
+from guidance.flight_time.extremal import Burn, Extremal, PrimerProblem, add_burn
 from guidance.kernel import compile_kernel
 
-_POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 _MOST_STEPS = 30
 _CONVERGED = 1e-10  # largest residual, non-dimensional: a micrometre on the paper's descents
-LEGS = 6
-"""Parts of an arc in a flown path."""
 _LATEST_FIRST_BURN = 0.5  # of the time before the braking burn, in a first guess
+_UNIT = 1e-6  # by which the square of a unit vector may differ from one
+_ANGLES = 4  # of the seven numbers of a step: two for each primer; three times follow
 
 
 @compile_kernel
-def _primer(x: Array, time: float, p: Array) -> None:
-    """Primer vector at a time; x = (q1, q2, t1, t2, T)."""
-    share = (time - x[6]) / (x[7] - x[6])
-    for axis in range(3):
-        p[axis] = x[axis] + (x[3 + axis] - x[axis]) * share
-
-
-@compile_kernel
-def _add_burn(x: Array, span: tuple[float, float, float], mass: float, flow: float, out: Array) -> None:
-    """Add to out = (r, v) at time span[2] what full thrust from span[0] to span[1] contributes.
-
-    Unit thrust; `mass` at the start, burnt at the rate `flow`. Gauss-Legendre quadrature.
-    """
-    begin, end, then = span
-    half = 0.5 * (end - begin)
-    p = np.empty(3)
-    for k in range(_POINTS.size):
-        elapsed = half * (1.0 + _POINTS[k])
-        _primer(x, begin + elapsed, p)
-        size = math.sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2])
-        push = half * _WEIGHTS[k] / ((mass - flow * elapsed) * max(size, 1e-12))
-        for axis in range(3):
-            gain = push * p[axis]
-            out[3 + axis] += gain
-            out[axis] += gain * (then - begin - elapsed)
-
-
-@compile_kernel
-def _residuals(x: Array, case: Array, out: Array) -> None:
-    """Seven equations of the module docstring; case = (r0, v0, g, mass flow), all non-dimensional."""
-    t1, t2, final, flow = x[6], x[7], x[8], case[9]
+def _residuals(x: Extremal, problem: PrimerProblem, out: Array) -> None:
+    """Seven equations of the module docstring, all non-dimensional."""
+    t1, t2, final = x.times[0], x.times[1], x.times[2]
+    r, v, g, flow = problem
     first = max(t1, 0.0)
     here = np.zeros(6)
     if first > 0.0:
-        _add_burn(x, (0.0, first, final), 1.0, flow, here)
+        add_burn(x, Burn(0.0, first, 1.0), flow, final, here)
     hamiltonian = 0.0
     for axis in range(3):
-        speed = case[3 + axis] + case[6 + axis] * t2 + here[3 + axis]
-        hamiltonian += x[3 + axis] * case[6 + axis] * (t2 - t1) - (x[3 + axis] - x[axis]) * speed
-    _add_burn(x, (t2, final, final), 1.0 - flow * first, flow, here)
+        q1, q2 = x.primer[0, axis], x.primer[1, axis]
+        speed = v[axis] + g[axis] * t2 + here[3 + axis]
+        hamiltonian += q2 * g[axis] * (t2 - t1) - (q2 - q1) * speed
+    add_burn(x, Burn(t2, final, 1.0 - flow * first), flow, final, here)
     for axis in range(3):
-        pull = case[6 + axis] * final
-        out[axis] = case[axis] + (case[3 + axis] + 0.5 * pull) * final + here[axis]
-        out[3 + axis] = case[3 + axis] + pull + here[3 + axis]
+        fall = g[axis] * final
+        out[axis] = r[axis] + (v[axis] + 0.5 * fall) * final + here[axis]
+        out[3 + axis] = v[axis] + fall + here[3 + axis]
     out[6] = hamiltonian
 
 
 @compile_kernel
-def _moved(x: Array, frame: Array, step: Array, out: Array) -> None:
+def _move(x: Extremal, frame: Array, step: Array, out: Extremal) -> None:
     """Apply a step: two angles of q1 and of q2 in their tangent frames, and the three times."""
     for k in range(2):
         size = 0.0
         for axis in range(3):
-            value = x[3 * k + axis]
+            value = x.primer[k, axis]
             value += frame[2 * k, axis] * step[2 * k] + frame[2 * k + 1, axis] * step[2 * k + 1]
-            out[3 * k + axis] = value
+            out.primer[k, axis] = value
             size += value * value
         for axis in range(3):
-            out[3 * k + axis] /= math.sqrt(size)
+            out.primer[k, axis] /= math.sqrt(size)
     for k in range(3):
-        out[6 + k] = x[6 + k] + step[4 + k]
+        out.times[k] = x.times[k] + step[_ANGLES + k]
 
 
 @compile_kernel
-def _set_frame(x: Array, frame: Array) -> None:
+def _copy(x: Extremal, out: Extremal) -> None:
+    for axis in range(3):
+        out.primer[0, axis], out.primer[1, axis] = x.primer[0, axis], x.primer[1, axis]
+        out.times[axis] = x.times[axis]
+
+
+@compile_kernel
+def _set_frame(x: Extremal, frame: Array) -> None:
     """Two unit vectors normal to q1, and two to q2."""
     for k in range(2):
-        q = x[3 * k : 3 * k + 3]
+        q = x.primer[k]
         axis = np.argmin(np.abs(q))
         first = -q[axis] * q
         first[axis] += 1.0
         first /= math.sqrt(first @ first)
-        frame[2 * k] = first
-        frame[2 * k + 1] = np.cross(q, first)
+        for i in range(3):
+            j, h = (i + 1) % 3, (i + 2) % 3
+            frame[2 * k, i] = first[i]
+            frame[2 * k + 1, i] = q[j] * first[h] - q[h] * first[j]
 
 
 @compile_kernel
@@ -115,16 +98,16 @@ def _norm(values: Array) -> float:
 
 
 @compile_kernel
-def _admitted(x: Array, flow: float) -> bool:
+def _admitted(x: Extremal, mass_flow: float) -> bool:
     """Whether the times are in order and mass is left."""
-    first = max(x[6], 0.0)
-    return first < x[7] < x[8] and flow * (first + x[8] - x[7]) < 0.95
+    first = max(x.times[0], 0.0)
+    return first < x.times[1] < x.times[2] and mass_flow * (first + x.times[2] - x.times[1]) < 0.95
 
 
 @compile_kernel
-def _solve_linear(matrix: Array, right: Array) -> bool:
+def _solve_linear(matrix: Array, vector: Array) -> bool:
     """Solve in place by elimination with row exchange; False where the matrix is singular."""
-    size = right.size
+    size = vector.size
     for k in range(size):
         best = k
         for i in range(k + 1, size):
@@ -135,29 +118,33 @@ def _solve_linear(matrix: Array, right: Array) -> bool:
         if best != k:
             for j in range(k, size):
                 matrix[k, j], matrix[best, j] = matrix[best, j], matrix[k, j]
-            right[k], right[best] = right[best], right[k]
+            vector[k], vector[best] = vector[best], vector[k]
         for i in range(k + 1, size):
             factor = matrix[i, k] / matrix[k, k]
             for j in range(k + 1, size):
                 matrix[i, j] -= factor * matrix[k, j]
-            right[i] -= factor * right[k]
+            vector[i] -= factor * vector[k]
     for k in range(size - 1, -1, -1):
         for j in range(k + 1, size):
-            right[k] -= matrix[k, j] * right[j]
-        right[k] /= matrix[k, k]
+            vector[k] -= matrix[k, j] * vector[j]
+        vector[k] /= matrix[k, k]
     return True
 
 
 @compile_kernel
-def _newton_step(x: Array, case: Array, here: Array, frame: Array) -> tuple[Array, bool]:
+def _newton_step(
+    x: Extremal, problem: PrimerProblem, here: Array, frame: Array, trial: Extremal
+) -> tuple[Array, bool]:
     """Full step towards a root, from a difference Jacobian, and whether there is one."""
     jacobian, there = np.empty((7, 7)), np.empty(7)
-    step, trial = np.zeros(7), np.empty(9)
+    step = np.zeros(7)
     _set_frame(x, frame)
     for k in range(7):
-        step[k] = -1e-7 if k == 4 and x[6] < 0.0 else 1e-7  # stay on one side of the kink at t1 = 0
-        _moved(x, frame, step, trial)
-        _residuals(trial, case, there)
+        step[k] = (
+            -1e-7 if k == _ANGLES and x.times[0] < 0.0 else 1e-7
+        )  # stay on one side of the kink at t1 = 0
+        _move(x, frame, step, trial)
+        _residuals(trial, problem, there)
         for i in range(7):
             jacobian[i, k] = (there[i] - here[i]) / step[k]
         step[k] = 0.0
@@ -167,126 +154,105 @@ def _newton_step(x: Array, case: Array, here: Array, frame: Array) -> tuple[Arra
 
 
 @compile_kernel
-def _newton(x: Array, case: Array) -> bool:
+def _newton(x: Extremal, problem: PrimerProblem) -> bool:
     """Damped Newton, in place; whether it converged."""
-    frame, step, trial = np.empty((4, 3)), np.empty(7), np.empty(9)
+    frame, step, trial = np.empty((4, 3)), np.empty(7), Extremal(np.empty((2, 3)), np.empty(3))
     here, there = np.empty(7), np.empty(7)
-    if not _admitted(x, case[9]):
+    if not _admitted(x, problem.mass_flow):
         return False
-    _residuals(x, case, here)
+    _residuals(x, problem, here)
     for _ in range(_MOST_STEPS):
         if _norm(here) < _CONVERGED:
             return True
-        full, found = _newton_step(x, case, here, frame)
+        full, found = _newton_step(x, problem, here, frame, trial)
         if not found:
             return False
-        share = min(1.0, 0.7 / max(1e-9, _norm(full[:4])), 0.5 / max(1e-9, _norm(full[5:])))
+        turn, delay = _norm(full[:_ANGLES]), _norm(full[_ANGLES + 1 :])
+        damping = min(1.0, 0.7 / max(1e-9, turn), 0.5 / max(1e-9, delay))
         before, better = math.sqrt(here @ here), False
         for _ in range(12):
-            step[:] = share * full
-            _moved(x, frame, step, trial)
-            if _admitted(trial, case[9]):
-                _residuals(trial, case, there)
-                if math.sqrt(there @ there) < (1.0 - 0.1 * share) * before:
+            for number in range(7):
+                step[number] = damping * full[number]
+            _move(x, frame, step, trial)
+            if _admitted(trial, problem.mass_flow):
+                _residuals(trial, problem, there)
+                if math.sqrt(there @ there) < (1.0 - 0.1 * damping) * before:
                     better = True
                     break
-            share *= 0.5
+            damping *= 0.5
         if not better:
             return False
-        x[:] = trial
-        here[:] = there
+        _copy(trial, x)
+        here, there = there, here
     return _norm(here) < _CONVERGED
 
 
 @compile_kernel
-def _guess(case: Array, first_burn: bool, x: Array) -> None:
+def _guess(problem: PrimerProblem, first_burn: bool, x: Extremal) -> bool:
     """First guess: a suicide burn along the vertical, and two sideways impulses, at the start and in it.
 
     Without the sideways impulse at the start (`first_burn` False) the primer comes from below.
+
+    Returns:
+        Whether there is one: next to the target's plane a primer may be too long for floating point.
     """
-    up = -case[6:9] / math.sqrt(case[6:9] @ case[6:9])
-    pull = math.sqrt(case[6:9] @ case[6:9])
-    height, climb = case[:3] @ up, case[3:6] @ up
-    coast = (2.0 * (1.0 - pull) * height - climb * climb) / 2.0
-    turn = math.sqrt(max(climb * climb + 2.0 * pull * coast, 1e-6 * pull * abs(height)))
-    t2 = max((turn + climb) / pull, 1e-2 * turn / pull)
-    final = t2 + turn / (1.0 - pull)
-    across = (case[:3] - height * up) / (0.5 * (t2 + final))
-    kick = -across - (case[3:6] - climb * up)
+    r, v, gravity, _ = problem
+    up = -gravity / math.sqrt(gravity @ gravity)
+    g = math.sqrt(gravity @ gravity)
+    height, climb = r @ up, v @ up
+    coast = (2.0 * (1.0 - g) * height - climb * climb) / 2.0
+    ignition_speed = math.sqrt(max(climb * climb + 2.0 * g * coast, 1e-6 * g * abs(height)))
+    t2 = max((ignition_speed + climb) / g, 1e-2 * ignition_speed / g)
+    final = t2 + ignition_speed / (1.0 - g)
+    across = (r - height * up) / (0.5 * (t2 + final))
+    kick = -across - (v - climb * up)
     size = math.sqrt(kick @ kick)
-    q2 = across + (turn + pull * (final - t2)) * up
+    q2 = across + (ignition_speed + g * (final - t2)) * up
     q2 /= math.sqrt(q2 @ q2)
-    x[3:6], x[7], x[8] = q2, t2, final
-    if first_burn and size > 1e-9 * turn:
-        x[6] = size if size < 0.8 * t2 else _LATEST_FIRST_BURN * t2
-        speed = case[3:6] + kick
+    t1 = min(t2 - 2.0 * ignition_speed / g, -1e-3 * t2)
+    if first_burn and size > 1e-9 * ignition_speed:
+        t1 = size if size < 0.8 * t2 else _LATEST_FIRST_BURN * t2
+        speed = v + kick
         sine, cosine = 1.0, 0.0
         for _ in range(5):  # the Hamiltonian at t1
-            gap = (speed @ up) - pull * (t2 - x[6])
+            gap = (speed @ up) - g * (t2 - t1)
             if gap == 0.0:
                 break
             cosine = ((q2 @ speed) - sine * (kick @ speed) / size) / gap
             cosine = min(max(cosine, -0.95), 0.95)
             sine = math.sqrt(1.0 - cosine * cosine)
-        x[:3] = sine * kick / size + cosine * up
+        q1 = sine * kick / size + cosine * up
     else:
-        x[6] = min(t2 - 2.0 * turn / pull, -1e-3 * t2)
-        x[:3] = 0.1 * kick / turn - up
-        x[:3] /= math.sqrt(x[:3] @ x[:3])
+        q1 = 0.1 * kick / ignition_speed - up
+        q1 /= math.sqrt(q1 @ q1)
+    for axis in range(3):
+        x.primer[0, axis], x.primer[1, axis] = q1[axis], q2[axis]
+    x.times[0], x.times[1], x.times[2] = t1, t2, final
+    return bool(abs(q1 @ q1 - 1.0) < _UNIT and abs(q2 @ q2 - 1.0) < _UNIT)
 
 
 @compile_kernel
-def solve_primer(case: Array, x: Array) -> bool:
-    """Find x = (q1, q2, t1, t2, T) for case = (r0, v0, g, mass flow), in units of the full thrust.
+def solve_primer(problem: PrimerProblem, x: Extremal) -> bool:
+    """Find the extremal of a problem.
 
     Args:
-        case: start seen from the target, gravity and share of the mass burnt per second at full thrust, all
-            but the last divided by full thrust over start mass: units are seconds alone. Shape (10,).
-        x: the answer, shape (9,).
+        problem: in seconds, as `PrimerProblem` says.
+        x: the answer, in seconds.
 
     Returns:
-        Whether Newton's method converged.
+        Whether there was a first guess, and Newton's method converged from it.
     """
-    if not 1e-6 < case[6:9] @ case[6:9] < 0.98 or not case[:3] @ case[6:9] < 0.0:
+    r, v, g, flow = problem
+    if not 1e-6 < g @ g < 0.98 or not r @ g < 0.0:
         return False
-    scaled = case.copy()
     for attempt in range(2):
-        _guess(case, attempt == 0, x)
-        unit = x[8]
-        scaled[:3] = case[:3] / (unit * unit)
-        scaled[3:6] = case[3:6] / unit
-        scaled[9] = case[9] * unit
-        x[6:] /= unit
-        if _newton(x, scaled):
-            x[6:] *= unit
+        if not _guess(problem, attempt == 0, x):
+            continue
+        unit = x.times[2]
+        for k in range(3):
+            x.times[k] /= unit
+        if _newton(x, PrimerProblem(r / (unit * unit), v / unit, g, flow * unit)):
+            for k in range(3):
+                x.times[k] *= unit
             return True
     return False
-
-
-@compile_kernel
-def fly_primer(x: Array, case: Array) -> Array:
-    """States and primers along a flight, at the ends of equal parts of its arcs.
-
-    Returns:
-        Rows (r, v, unit vector of p) in the units of `solve_primer`, from the start to the landing.
-    """
-    first, flow = max(x[6], 0.0), case[9]
-    ends = np.array([0.0, first, x[7], x[8]])
-    path = np.empty((3 * LEGS + 1, 9))
-    state, p, time, mass = case[:6].copy(), np.empty(3), 0.0, 1.0
-    for k in range(3 * LEGS + 1):
-        _primer(x, time, p)
-        path[k, :6] = state
-        path[k, 6:] = p / max(math.sqrt(p @ p), 1e-12)
-        arc, part = k // LEGS, k % LEGS
-        if arc == 3:
-            break
-        step = (ends[arc + 1] - ends[arc]) / LEGS
-        then = ends[arc] + (part + 1) * step
-        state[:3] += state[3:] * step + 0.5 * step * step * case[6:9]
-        state[3:] += step * case[6:9]
-        if arc != 1:
-            _add_burn(x, (time, then, then), mass, flow, state)
-            mass -= flow * (then - time)
-        time = then
-    return path

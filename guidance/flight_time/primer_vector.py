@@ -12,7 +12,8 @@ import numpy as np
 
 from guidance.arrays import Array
 from guidance.descent.problem import LandingProblem
-from guidance.flight_time.primer_equations import LEGS, fly_primer, solve_primer
+from guidance.flight_time.extremal import LEGS, Extremal, PrimerPath, PrimerProblem, fly_extremal
+from guidance.flight_time.primer_equations import solve_primer
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +43,7 @@ class PrimerFlight:
         return np.log1p(-self.burn_rate * burning)
 
     @property
-    def propellant_share(self) -> float:
+    def log_mass_ratio(self) -> float:
         """ln(start mass / final mass)."""
         return -math.log1p(-self.burn_rate * (self.first_burn + self.time - self.braking))
 
@@ -64,35 +65,35 @@ def find_primer_flight(problem: LandingProblem) -> PrimerFlight | None:
     lander, mass = problem.lander, problem.state.mass
     if lander.min_thrust > 0.0 or problem.target_velocity.any():
         return None
-    push = lander.max_thrust / mass
-    case, x = np.empty(10), np.empty(9)
-    case[:3], case[3:6], case[6:9] = problem.offset, problem.state.velocity, problem.gravity
-    case[:9] /= push
-    case[9] = lander.max_mass_flow / mass
-    try:
-        if not solve_primer(case, x):
-            return None
-    except ZeroDivisionError:  # no length or no pull to scale by
+    unit = lander.max_thrust / mass
+    scaled = PrimerProblem(
+        problem.offset / unit,
+        problem.state.velocity / unit,
+        problem.gravity / unit,
+        lander.max_mass_flow / mass,
+    )
+    x = Extremal(np.empty((2, 3)), np.empty(3))
+    if not solve_primer(scaled, x):
         return None
-    times = float(x[6]), float(x[7])
-    flight = PrimerFlight(max(times[0], 0.0), times[1], float(x[8]), case[9], x[:6].reshape(2, 3), times)
-    if flight.propellant_share > problem.log_mass_ratio:
+    t1, t2, final = (float(time) for time in x.times)
+    flight = PrimerFlight(max(t1, 0.0), t2, final, scaled.mass_flow, x.primer, (t1, t2))
+    if flight.log_mass_ratio > problem.log_mass_ratio:
         return None
-    return flight if _keeps_limits(problem, fly_primer(x, case), push) else None
+    return flight if _keeps_limits(problem, fly_extremal(x, scaled), unit) else None
 
 
-def _keeps_limits(problem: LandingProblem, path: Array, push: float) -> bool:
-    """Whether a flown path, in units of `push` and seconds, keeps every limit of the problem."""
-    position = push * path[:-1, :3]
+def _keeps_limits(problem: LandingProblem, path: PrimerPath, unit: float) -> bool:
+    """Whether a flown path, in units of the acceleration `unit` and seconds, keeps every limit."""
+    position = unit * path.position[:-1]
     height = position[:, 2]
     if height.min() < -1e-6 * np.abs(position).max():
         return False
     limit, speed, glide = problem.lander.pointing_limit, problem.speed_limit, problem.glide_slope_limit
     if limit is not None:
         burning = np.r_[0 : LEGS + 1, 2 * LEGS : 3 * LEGS + 1]
-        if path[burning, 8].min() < math.cos(limit):
+        if path.direction[burning, 2].min() < math.cos(limit):
             return False
-    if speed is not None and (path[:, 3:6] ** 2).sum(axis=1).max() > (speed / push) ** 2:
+    if speed is not None and (path.velocity**2).sum(axis=1).max() > (speed / unit) ** 2:
         return False
     across = np.hypot(position[:, 0], position[:, 1])
     return glide is None or bool((across * math.cos(glide) <= height * math.sin(glide)).all())

@@ -10,9 +10,9 @@ halved on the sign of J'.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from typing import Generic, Protocol, TypeVar
+from typing import Generic, NamedTuple, Protocol, TypeVar
 
 from guidance.flight_time.time_window import TimeWindow
 
@@ -55,13 +55,13 @@ class TimeModel:
 
     Attributes:
         asymptote: a, or zero if unknown: then J' itself takes the place of w.
-        pace: dT/dw, as found by an earlier search; zero if unknown.
-        dead_time: c/T for the first step, where `pace` is unknown: 0.75 suits a typical descent; nearer to
+        secant: dT/dw, as found by an earlier search; zero if unknown.
+        dead_time: c/T for the first step, where `secant` is unknown: 0.75 suits a typical descent; nearer to
             one, the step is smaller.
     """
 
     asymptote: float
-    pace: float = 0.0
+    secant: float = 0.0
     dead_time: float = 0.75
 
     def warp(self, slope: float) -> float:
@@ -73,8 +73,8 @@ class TimeModel:
     def stationary_time(self, sample: TimedSolution) -> float:
         """[s] where J' of the model through one sample vanishes."""
         here, goal = self.warp(sample.slope), self.warp(0.0)
-        if self.pace > 0.0:
-            return sample.time + self.pace * (goal - here)
+        if self.secant > 0.0:
+            return sample.time + self.secant * (goal - here)
         if self.asymptote <= 0.0:
             return sample.time * (_BLIND_STEP if sample.slope < 0.0 else 1.0 / _BLIND_STEP)
         return sample.time * (1.0 + (1.0 - self.dead_time) * (goal / here - 1.0))
@@ -183,10 +183,10 @@ class TimeSearch(Generic[Solution]):
             if falling and rising:
                 pair = [falling[-1], rising[0]]
                 if self._stalled():
-                    return _tangents_cross(*pair)[0]
+                    return _tangents_cross(*pair).time
             gap = self.model.warp(pair[1].slope) - self.model.warp(pair[0].slope)
-            pace = (pair[1].time - pair[0].time) / gap if gap > 0.0 else 0.0  # zero where J is concave
-            self.model = replace(self.model, pace=pace)
+            secant = (pair[1].time - pair[0].time) / gap if gap > 0.0 else 0.0  # zero where J is concave
+            self.model = replace(self.model, secant=secant)
             goal = self._parabola(feasible)
             if falling and rising and goal is not None and pair[0].time < goal < pair[1].time:
                 return goal
@@ -224,12 +224,10 @@ class TimeSearch(Generic[Solution]):
 
         Zero where the optimum is not bracketed yet.
         """
-        falling = [s for s in self.samples if s.solved and s.slope < 0.0]
-        rising = [s for s in self.samples if s.solved and s.slope >= 0.0]
-        if self.best is None or not falling or not rising:
+        falling, rising = nearest_to_optimum(self.samples)
+        if self.best is None or falling is None or rising is None:
             return 0.0
-        left, right = max(falling, key=lambda s: s.time), min(rising, key=lambda s: s.time)
-        return (self.best.value - _tangents_cross(left, right)[1]) / self._tolerance
+        return (self.best.value - _tangents_cross(falling, rising).value) / self._tolerance
 
     def _closed(self) -> bool:
         """Whether a bracketed optimum leaves nothing to gain."""
@@ -237,12 +235,27 @@ class TimeSearch(Generic[Solution]):
         return len(signs) == 2 and self._kink() < 1.0
 
 
-def _tangents_cross(left: TimedSolution, right: TimedSolution) -> tuple[float, float]:
-    """Time and cost where the tangents at two samples on either side of the optimum meet."""
-    if right.slope == left.slope:
-        return left.time, min(left.value, right.value)
-    time = (left.value - right.value + right.slope * right.time - left.slope * left.time) / (
-        right.slope - left.slope
+def nearest_to_optimum(samples: Iterable[Solution]) -> tuple[Solution | None, Solution | None]:
+    """The last solved sample of the falling side, and the first of the rising one."""
+    solved = [s for s in samples if s.solved]
+    falling, rising = [s for s in solved if s.slope < 0.0], [s for s in solved if s.slope >= 0.0]
+    last = max(falling, key=lambda s: s.time, default=None)
+    return last, min(rising, key=lambda s: s.time, default=None)
+
+
+class _Crossing(NamedTuple):
+    """Where two tangents meet: a time [s] and a cost."""
+
+    time: float
+    value: float
+
+
+def _tangents_cross(falling: TimedSolution, rising: TimedSolution) -> _Crossing:
+    """Where the tangents at two samples on either side of the optimum meet."""
+    if rising.slope == falling.slope:
+        return _Crossing(falling.time, min(falling.value, rising.value))
+    time = (falling.value - rising.value + rising.slope * rising.time - falling.slope * falling.time) / (
+        rising.slope - falling.slope
     )
-    time = min(max(time, min(left.time, right.time)), max(left.time, right.time))
-    return time, left.value + left.slope * (time - left.time)
+    time = min(max(time, min(falling.time, rising.time)), max(falling.time, rising.time))
+    return _Crossing(time, falling.value + falling.slope * (time - falling.time))

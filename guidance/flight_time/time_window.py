@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -36,6 +36,9 @@ class TimeWindow:
         return np.geomspace(self.low, self.high, min(max(count, 4), 24))
 
 
+_NO_TIME = TimeWindow(math.inf, -math.inf)
+
+
 def _square(*coefficients: Array) -> Array:
     """Coefficients (rising powers) of |sum_k c_k T^k|^2."""
     total = np.zeros(2 * len(coefficients) - 1)
@@ -52,7 +55,7 @@ def _necessary(problem: LandingProblem, free_landing_point: bool) -> dict[str, l
     v T - g T^2/2, int t u = w T - R - g T^2/2, while |u| <= max_thrust/dry_mass and int |u| <=
     exhaust_velocity ln(m/m_dry).
     """
-    push = problem.lander.max_thrust / problem.lander.dry_mass
+    thrust_acceleration = problem.lander.max_thrust / problem.lander.dry_mass
     supply = problem.lander.exhaust_velocity * problem.log_mass_ratio
     only = slice(2, 3) if free_landing_point else slice(0, 3)
     v, w, g, miss = problem.state.velocity, problem.target_velocity, problem.gravity, -problem.offset
@@ -65,17 +68,17 @@ def _necessary(problem: LandingProblem, free_landing_point: bool) -> dict[str, l
         thrust, propellant = zero.copy(), zero.copy()
         thrust[: vector.size] -= vector
         propellant[: vector.size] -= vector
-        thrust[2 * power] += (push / power) ** 2
+        thrust[2 * power] += (thrust_acceleration / power) ** 2
         propellant[2 * power - 2] += supply**2
         out["maximum thrust"].append(thrust)
         out["propellant"].append(propellant)
     return out
 
 
-def _hull(polynomials: list[Array], low: float, high: float) -> tuple[float, float]:
-    """First and last time in [low, high] at which all polynomials are >= 0; (inf, -inf) if there is none."""
+def _hull(polynomials: list[Array], low: float, high: float) -> TimeWindow:
+    """From the first to the last time in [low, high] at which all polynomials are >= 0."""
     if high <= low:
-        return math.inf, -math.inf
+        return _NO_TIME
     marks = [low, high]
     for polynomial in polynomials:
         roots = np.roots(polynomial[::-1])
@@ -86,8 +89,8 @@ def _hull(polynomials: list[Array], low: float, high: float) -> tuple[float, flo
     powers = middle[:, None] ** np.arange(5)
     good = np.flatnonzero((powers @ np.array(polynomials).T >= 0.0).all(axis=1))
     if good.size == 0:
-        return math.inf, -math.inf
-    return float(edges[good[0]]), float(edges[good[-1] + 1])
+        return _NO_TIME
+    return TimeWindow(float(edges[good[0]]), float(edges[good[-1] + 1]))
 
 
 def _broken_at_ends(problem: LandingProblem, free_landing_point: bool) -> str:
@@ -139,13 +142,13 @@ def forbidden_by(problem: LandingProblem, time: float, free_landing_point: bool 
     return broken or (_too_fast(problem) if time > (1.0 + ROUNDING) * _latest_contact(problem) else "")
 
 
-def _crossing_time(problem: LandingProblem, push: float) -> float:
+def _crossing_time(problem: LandingProblem, thrust_acceleration: float) -> float:
     """[s] time to cross the distance at full thrust from rest, or faster, by the speed at the target."""
-    still = math.sqrt(2.0 * float(np.linalg.norm(problem.offset)) / push)
+    still = math.sqrt(2.0 * float(np.linalg.norm(problem.offset)) / thrust_acceleration)
     if still == 0.0:
         return 0.0
-    share = float(np.linalg.norm(problem.target_velocity)) / (push * still)
-    return still / (share + math.hypot(share, 1.0))
+    ratio = float(np.linalg.norm(problem.target_velocity)) / (thrust_acceleration * still)
+    return still / (ratio + math.hypot(ratio, 1.0))
 
 
 def time_window(problem: LandingProblem, free_landing_point: bool = False) -> TimeWindow:
@@ -163,38 +166,38 @@ def time_window(problem: LandingProblem, free_landing_point: bool = False) -> Ti
     """
     broken = _broken_at_ends(problem, free_landing_point)
     if broken:
-        return TimeWindow(math.inf, -math.inf, broken)
+        return replace(_NO_TIME, cause=broken)
     lander, state = problem.lander, problem.state
-    push = lander.max_thrust / lander.dry_mass
+    thrust_acceleration = lander.max_thrust / lander.dry_mass
     supply = lander.exhaust_velocity * problem.log_mass_ratio
     speed = float(np.linalg.norm(state.velocity - problem.target_velocity))
-    pace = max(speed / push + _crossing_time(problem, push), 1e-3)
-    high = 100.0 * pace
-    pull = float(np.linalg.norm(problem.gravity))
-    if pull > 0.0:
-        high = max(high, 2.0 * (supply + speed) / pull)
+    engine_time = max(speed / thrust_acceleration + _crossing_time(problem, thrust_acceleration), 1e-3)
+    high = 100.0 * engine_time
+    gravity = float(np.linalg.norm(problem.gravity))
+    if gravity > 0.0:
+        high = max(high, 2.0 * (supply + speed) / gravity)
     if lander.min_thrust > 0.0:
         high = min(high, (state.mass - lander.dry_mass) * lander.exhaust_velocity / lander.min_thrust)
     limits = _necessary(problem, free_landing_point)
-    low, contact = 1e-3 * pace, _latest_contact(problem)
+    low, contact = 1e-3 * engine_time, _latest_contact(problem)
     window = _hull(limits["maximum thrust"] + limits["propellant"], low, min(high, contact))
-    if window[0] <= window[1]:
-        return TimeWindow(*window)
-    if contact < high and _hull(limits["maximum thrust"] + limits["propellant"], low, high)[0] < math.inf:
-        return TimeWindow(*window, cause="altitude")
-    alone = [name for name, parts in limits.items() if _hull(parts, low, high)[0] == math.inf]
-    return TimeWindow(*window, cause=" and ".join(alone or limits))
+    if not window.empty:
+        return window
+    if contact < high and not _hull(limits["maximum thrust"] + limits["propellant"], low, high).empty:
+        return replace(window, cause="altitude")
+    alone = [name for name, parts in limits.items() if _hull(parts, low, high).empty]
+    return replace(window, cause=" and ".join(alone or limits))
 
 
 def guess_time(problem: LandingProblem, window: TimeWindow) -> float:
     """[s] first guess: coast, then brake to the target velocity at full thrust, along the vertical alone."""
     lift = problem.lander.max_thrust / problem.state.mass + float(problem.gravity[2])
-    pull, height = -float(problem.gravity[2]), float(problem.offset[2])
+    gravity, height = -float(problem.gravity[2]), float(problem.offset[2])
     climb = float(problem.state.velocity[2])
-    if pull <= 0.0 or lift <= 0.0:
+    if gravity <= 0.0 or lift <= 0.0:
         return math.sqrt(window.low * min(window.high, 10.0 * window.low))
     arrival = max(0.0, -float(problem.target_velocity[2]))
-    coast = (2.0 * lift * height - climb * climb + arrival * arrival) / (2.0 * (lift + pull))
-    turn = math.sqrt(max(climb * climb + 2.0 * pull * min(coast, height), 0.0))
-    time = max((turn + climb) / pull, 0.0) + max(turn - arrival, 0.0) / lift
+    coast = (2.0 * lift * height - climb * climb + arrival * arrival) / (2.0 * (lift + gravity))
+    turn = math.sqrt(max(climb * climb + 2.0 * gravity * min(coast, height), 0.0))
+    time = max((turn + climb) / gravity, 0.0) + max(turn - arrival, 0.0) / lift
     return min(max(time, 1.05 * window.low), window.high)

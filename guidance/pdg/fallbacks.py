@@ -55,16 +55,16 @@ class Request:
         return replace(self, nodes=nodes, guess=found)
 
 
-def time_left(guess: Plan, state: State) -> float | None:
+def remaining_time(guess: Plan, state: State) -> float | None:
     """[s] what is left of an earlier plan at its node nearest to `state`; None if nothing is."""
     if guess.nodes == 0:
         return None
-    pace = guess.time_of_flight
-    gap = np.linalg.norm(guess.position - state.position, axis=1) + 0.1 * pace * np.linalg.norm(
+    duration = guess.time_of_flight
+    gap = np.linalg.norm(guess.position - state.position, axis=1) + 0.1 * duration * np.linalg.norm(
         guess.velocity - state.velocity, axis=1
     )
-    left = guess.time_of_flight - float(guess.time[int(gap.argmin())])
-    return left if left > 0.0 else None
+    remaining = duration - float(guess.time[int(gap.argmin())])
+    return remaining if remaining > 0.0 else None
 
 
 def answer(request: Request, unreachable: str) -> Plan:
@@ -105,7 +105,7 @@ def plan_by_method(request: Request) -> Plan:
 def _plan_convex(request: Request) -> Plan:
     """The convex problem; where relaxing lost something, the unrelaxed one from the relaxed flight."""
     guess = request.guess
-    return _plan_convex_from(request, None if guess is None else time_left(guess, request.problem.state))
+    return _plan_convex_from(request, None if guess is None else remaining_time(guess, request.problem.state))
 
 
 def _plan_convex_from(request: Request, seed: float | None) -> Plan:

@@ -14,7 +14,7 @@ from guidance.flight_time.time_window import forbidden_by
 from guidance.planning.convex_task import ConvexTask, relaxation_tight
 from guidance.planning.infeasibility import prove_fixed_time, prove_free_time
 from guidance.planning.minimum_propellant import (
-    SHARE_TOLERANCE,
+    LOG_MASS_TOLERANCE,
     minimise_over_time,
     minimise_with_true_bounds,
     promised_gain,
@@ -22,7 +22,7 @@ from guidance.planning.minimum_propellant import (
 
 METHOD = "convex"
 _OVERDRAFT = 1e-9  # in ln(mass): rounding of the solver
-_REPLAN_TOLERANCE = 1.5e-5  # in ln(mass), as SHARE_TOLERANCE: 18 g at 1200 kg
+_REPLAN_TOLERANCE = 1.5e-5  # in ln(mass), as LOG_MASS_TOLERANCE: 18 g at 1200 kg
 _WORTH_A_SEARCH = 4e-5  # gain in ln(mass) that a time found with relaxed bounds may promise to another time
 _ERROR_TOLERANCE = 0.02  # [m] gain in landing error below which the time search stops
 _ERROR_SLACK = 0.05  # [m] landing error granted to the least-propellant step
@@ -70,7 +70,7 @@ def plan_convex(
             return ConvexAnswer(Plan(PlanStatus.INFEASIBLE, problem, METHOD, message=cause))
         solution, solves = task.solve(time_of_flight), 1
     else:
-        tolerance = SHARE_TOLERANCE if guess_time is None else _REPLAN_TOLERANCE
+        tolerance = LOG_MASS_TOLERANCE if guess_time is None else _REPLAN_TOLERANCE
         outcome = minimise_over_time(task, tolerance, guess_time, coarse_first=guess_time is None)
         solution, solves = outcome.solution, outcome.solves
         if solution is None and outcome.cause:
@@ -112,7 +112,7 @@ def _finish(
     affordable = _affordable(problem, solution)
     if worth_a_search is not None and (not affordable or promised_gain(task, solution) > worth_a_search):
         outcome = minimise_with_true_bounds(
-            task, SHARE_TOLERANCE, found.time, solution if affordable else None
+            task, LOG_MASS_TOLERANCE, found.time, solution if affordable else None
         )
         solution, solves = outcome.solution or solution, solves + outcome.solves
     none = replace(none, solves=solves)
@@ -129,11 +129,11 @@ def _finish(
 
 def _affordable(problem: LandingProblem, solution: ConvexSolution) -> bool:
     """Whether there is a flight, and the propellant on board suffices for it."""
-    return solution.solved and solution.propellant_share <= problem.log_mass_ratio + _OVERDRAFT
+    return solution.solved and solution.log_mass_ratio <= problem.log_mass_ratio + _OVERDRAFT
 
 
 def _shortage(problem: LandingProblem, solution: ConvexSolution) -> str:
-    needed = problem.state.mass * -math.expm1(-solution.propellant_share)
+    needed = problem.state.mass * -math.expm1(-solution.log_mass_ratio)
     return (
         f"propellant: the cheapest flight found needs {needed:.2f} kg, "
         f"{problem.state.mass - problem.lander.dry_mass:.2f} kg are on board"
@@ -174,7 +174,7 @@ def plan_nearest(
         cheapest = minimise_over_time(anywhere)
         solves = cheapest.solves
         found = cheapest.solution
-        if found is None or found.propellant_share > problem.log_mass_ratio:
+        if found is None or found.log_mass_ratio > problem.log_mass_ratio:
             message = "no soft landing anywhere in the target's plane was found"
             if found is not None:
                 message += f"; {_shortage(problem, found)}"
@@ -192,7 +192,7 @@ def plan_nearest(
     if time_of_flight is not None:
         last, more = economical.solve(time_of_flight), 1
     else:
-        outcome = minimise_over_time(economical, SHARE_TOLERANCE, least.time, coarse_first=False)
+        outcome = minimise_over_time(economical, LOG_MASS_TOLERANCE, least.time, coarse_first=False)
         last, more = outcome.solution, outcome.solves
         if last is not None and not _affordable(problem, last):
             last, more = economical.solve(least.time), more + 1

@@ -49,8 +49,8 @@ class ConvexTask:
     def solve(self, time: float, log_mass: Array | None = None) -> ConvexSolution:
         """One conic solve; thrust bounds linearised at `log_mass` (any length), or outward if None."""
         if log_mass is not None and log_mass.size != self.nodes:
-            shares = np.linspace(0.0, 1.0, log_mass.size)
-            log_mass = np.interp(np.linspace(0.0, 1.0, self.nodes), shares, log_mass)
+            fractions = np.linspace(0.0, 1.0, log_mass.size)
+            log_mass = np.interp(np.linspace(0.0, 1.0, self.nodes), fractions, log_mass)
         chosen = ConstraintSet.of(self.problem, self.nodes, self.free_landing_point)
         scaled = scale_problem(
             self.problem, time, self.nodes, log_mass, self.error_limit, self.limit_propellant
@@ -102,20 +102,21 @@ def relaxation_tight(problem: LandingProblem, solution: ConvexSolution) -> bool:
     long, where the engine's least thrust exceeds the weight, or where the thrust turns round from one node to
     the next and dips on the way.
     """
-    push = solution.answer.primal[solution.layout.acceleration]
-    size = np.linalg.norm(push, axis=1)
+    acceleration = solution.answer.primal[solution.layout.acceleration]
+    size = np.linalg.norm(acceleration, axis=1)
     ratio, limit = problem.lander.min_thrust / problem.lander.max_thrust, problem.lander.pointing_limit
     thrust = size * np.exp(solution.log_mass)
     if thrust.min() < ratio * (1.0 - 2.0 * _THRUST_TOLERANCE):
         return False
-    if ratio > 0.0 and (_least_between(push) * np.exp(solution.log_mass[1:])).min() < ratio * (1.0 - _DIP):
+    between = _least_between(acceleration) * np.exp(solution.log_mass[1:])
+    if ratio > 0.0 and between.min() < ratio * (1.0 - _DIP):
         return False
-    return pointing_excess(push, limit, 1.0) <= FLIGHT_TOLERANCE.pointing
+    return pointing_excess(acceleration, limit, 1.0) <= FLIGHT_TOLERANCE.pointing
 
 
-def _least_between(push: Array) -> Array:
+def _least_between(acceleration: Array) -> Array:
     """Least magnitude on the straight way from each row to the next, shape (N - 1,)."""
-    way = np.diff(push, axis=0)
+    way = np.diff(acceleration, axis=0)
     length = np.maximum((way**2).sum(axis=1), 1e-300)
-    share = np.clip(-(push[:-1] * way).sum(axis=1) / length, 0.0, 1.0)
-    return np.linalg.norm(push[:-1] + share[:, None] * way, axis=1)
+    fraction = np.clip(-(acceleration[:-1] * way).sum(axis=1) / length, 0.0, 1.0)
+    return np.linalg.norm(acceleration[:-1] + fraction[:, None] * way, axis=1)

@@ -142,7 +142,7 @@ def plan_deferred(
     if missing:
         return DeferredDecision((), 0, missing, solves)
     extra = -np.log1p(-budget / problem.state.mass)
-    limits = [min(part.propellant_share + extra, problem.log_mass_ratio) + _SLACK for part in alone]
+    limits = [min(part.log_mass_ratio + extra, problem.log_mass_ratio) + _SLACK for part in alone]
     question = _Question(problems, time_of_flight, nodes, limits, chances / chances.sum())
     shared, flights, more = _longest_trunk(question, alone)
     plans = tuple(
@@ -163,7 +163,7 @@ def _cheapest_alone(
         task = ConvexTask(problem, nodes)
         solution, more = task.refine(task.solve(time))
         solves += 1 + more
-        if solution.solved and solution.propellant_share > problem.log_mass_ratio + _SLACK:
+        if solution.solved and solution.log_mass_ratio > problem.log_mass_ratio + _SLACK:
             solution = replace(solution, answer=replace(solution.answer, status=SolveStatus.INFEASIBLE))
         out.append(solution)
     return out, solves

@@ -38,7 +38,7 @@ def prove_at(task: ConvexTask, time: float) -> FarkasProof | ConvexSolution:
             if part.name == "propellant":
                 multipliers[first] += 1.0
             first += part.bound.size
-    proof = FarkasProof(time, rows, multipliers, scaled.reach)
+    proof = FarkasProof(time, rows, multipliers, scaled.unknown_bound)
     return proof if proof.verified else solution
 
 
@@ -85,7 +85,7 @@ def prove_free_time(task: ConvexTask, also: tuple[float, ...] = ()) -> Certifica
         if isinstance(proof, FarkasProof):
             proofs.append(proof)
             continue
-        if proof.solved and proof.propellant_share <= task.problem.log_mass_ratio:
+        if proof.solved and proof.log_mass_ratio <= task.problem.log_mass_ratio:
             return proof
         return None
     causes = tuple(dict.fromkeys(cause for proof in proofs for cause in proof.causes))

@@ -19,9 +19,29 @@ from guidance.planning.convex_task import MOST_REFINEMENTS, ConvexTask, bounds_h
 _COARSE_NODES = 13
 _NEAR_DEAD_TIME = 0.97  # first steps are small where the guess is good
 _STEPS_FROM_EDGE = (1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3)  # changes of a time that the true bounds refuse
-_COARSE_TOLERANCE = 20.0  # of a bracket's search on the coarse mesh: J has kinks where burns meet its nodes
-SHARE_TOLERANCE = 4e-6
+LOG_MASS_TOLERANCE = 4e-6
 """Gain in ln(mass) below which the time search stops: 5 g of propellant at 1200 kg."""
+
+
+@dataclass(frozen=True)
+class _Search:
+    """How the best time of a task is searched.
+
+    Attributes:
+        kind: the search that suits the cost.
+        coarse_tolerance: of the search on a coarse mesh, in tolerances.
+    """
+
+    kind: type[TimeSearch[ConvexSolution]]
+    coarse_tolerance: float
+
+    @classmethod
+    def of(cls, task: ConvexTask) -> _Search:
+        """The search for a task: J has a known shape, unless the flight ends with a velocity.
+
+        There it has kinks too where burns meet the nodes of a coarse mesh.
+        """
+        return cls(BracketSearch, 20.0) if task.problem.target_velocity.any() else cls(TimeSearch, 2.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +68,7 @@ def _asymptote(task: ConvexTask) -> float:
 
 def minimise_over_time(
     task: ConvexTask,
-    tolerance: float = SHARE_TOLERANCE,
+    tolerance: float = LOG_MASS_TOLERANCE,
     guess: float | None = None,
     coarse_first: bool = True,
 ) -> TimeOutcome:
@@ -77,12 +97,10 @@ def minimise_over_time(
     start = guess_time(task.problem, window) if guess is None else guess
     start = min(max(start, window.low), window.high)
     solves = 0
-    kind, share = (
-        (BracketSearch, _COARSE_TOLERANCE) if task.problem.target_velocity.any() else (TimeSearch, 2.0)
-    )
+    chosen = _Search.of(task)
     if coarse_first and task.nodes > 1.5 * _COARSE_NODES:
         coarse = replace(task, nodes=_COARSE_NODES, tolerance=1e-6)
-        search = kind(coarse.solve, window, share * tolerance, model)
+        search = chosen.kind(coarse.solve, window, chosen.coarse_tolerance * tolerance, model)
         found = search.run(start)
         solves = len(search.samples)
         if found is not None:
@@ -91,7 +109,7 @@ def minimise_over_time(
                 refined, more = coarse.refine(found)
                 solves += more
                 reference = refined.log_mass if refined.solved else None
-    search = kind(_evaluation(task, reference), window, tolerance, model)
+    search = chosen.kind(_evaluation(task, reference), window, tolerance, model)
     return TimeOutcome(search.run(start), solves + len(search.samples))
 
 
@@ -120,10 +138,10 @@ def minimise_with_true_bounds(
             reference = solution.log_mass
         return solution
 
-    window = time_window(task.problem, task.free_landing_point)
+    window, search = time_window(task.problem, task.free_landing_point), _Search.of(task).kind
     model = TimeModel(_asymptote(task))
     if known is not None:
-        return TimeOutcome(TimeSearch(evaluate, window, tolerance, model).run(near, known), solves)
+        return TimeOutcome(search(evaluate, window, tolerance, model).run(near, known), solves)
     for step in _STEPS_FROM_EDGE:
         for time in (near * (1.0 + step), near / (1.0 + step)):
             if not window.low <= time <= window.high:
@@ -131,8 +149,7 @@ def minimise_with_true_bounds(
             first = evaluate(time)
             if first.solved:
                 low, high = (near, window.high) if time > near else (window.low, near)
-                search = TimeSearch(evaluate, TimeWindow(low, high), tolerance, model)
-                best = search.run(time, first)
+                best = search(evaluate, TimeWindow(low, high), tolerance, model).run(time, first)
                 return TimeOutcome(best, solves)
     return TimeOutcome(None, solves)
 
@@ -178,5 +195,5 @@ def _search_from_primer(task: ConvexTask, tolerance: float) -> TimeOutcome | Non
     if model.gain(first) < tolerance:
         return TimeOutcome(first, 1)
     window = time_window(task.problem)
-    search = TimeSearch(_evaluation(task, reference), window, tolerance, model)
+    search = _Search.of(task).kind(_evaluation(task, reference), window, tolerance, model)
     return TimeOutcome(search.run(flight.time, first), len(search.samples))

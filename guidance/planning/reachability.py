@@ -96,7 +96,7 @@ def reachable_set(
     if times is None:
         anywhere = ConvexTask(problem, nodes, free_landing_point=True)
         cheapest = minimise_over_time(anywhere, _COARSE, coarse_first=False).solution
-        times = () if cheapest is None else [share * cheapest.time for share in _TIMES]
+        times = () if cheapest is None else [factor * cheapest.time for factor in _TIMES]
     slices = [
         _slice_at(problem, finite_number("times", time, above=0.0), directions, nodes) for time in times
     ]

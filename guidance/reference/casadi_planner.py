@@ -22,7 +22,7 @@ from guidance.arrays import Array
 from guidance.descent.plan import Plan, PlanStatus
 from guidance.descent.problem import LandingProblem
 from guidance.descent.trajectory import Trajectory
-from guidance.flight_time.time_window import forbidden_by, guess_time, time_window
+from guidance.flight_time.time_window import TimeWindow, forbidden_by, guess_time, time_window
 from guidance.reference.nonlinear_program import Limits, NonlinearSolver, nonlinear_program
 from guidance.reference.trajectory_guess import (
     is_vertical,
@@ -40,7 +40,7 @@ _GREATEST_LEAST = 1.0 - 5e-4  # of full thrust: an interior-point method needs r
 _GREATEST_MIDWAY = 0.98  # of full thrust: an engine without throttle may turn by 23 degrees an interval
 
 
-def _parameters(problem: LandingProblem, units: Units, ends: tuple[float, float], smoothing: float) -> Array:
+def _parameters(problem: LandingProblem, units: Units, times: TimeWindow, smoothing: float) -> Array:
     lander = problem.lander
     least = lander.min_thrust / lander.max_thrust
     return np.concatenate(
@@ -57,7 +57,7 @@ def _parameters(problem: LandingProblem, units: Units, ends: tuple[float, float]
             [-problem.log_mass_ratio, 1e-8 if lander.min_thrust > 0.0 else smoothing],
             [math.cos(lander.pointing_limit or math.pi)],
             [problem.glide_slope_limit or 0.0, (problem.speed_bound or 0.0) / units.speed],
-            np.array(ends) / units.time,
+            np.array([times.low, times.high]) / units.time,
         ]
     )
 
@@ -65,17 +65,17 @@ def _parameters(problem: LandingProblem, units: Units, ends: tuple[float, float]
 def _pack(units: Units, problem: LandingProblem, flight: Trajectory, free_time: bool) -> Array:
     """Decision vector of a trajectory in SI."""
     mass = flight.mass
-    push = flight.acceleration / units.acceleration
+    acceleration = flight.acceleration / units.acceleration
     columns = [
         (flight.position - problem.target) / units.length,
         flight.velocity / units.speed,
         np.log(mass / problem.state.mass)[:, None],
-        push,
+        acceleration,
     ]
     if free_time:
         columns.append(np.full((mass.size, 1), flight.duration / units.time))
     states = np.hstack(columns)
-    return np.concatenate([np.hstack([states[:-1], push[1:]]).ravel(), states[-1]])
+    return np.concatenate([np.hstack([states[:-1], acceleration[1:]]).ravel(), states[-1]])
 
 
 def _unpack(
@@ -125,8 +125,8 @@ def plan_casadi(
         start = rest_of_flight(problem, guess.trajectory, nodes)
     else:
         start = least_energy_flight(problem, nodes, time_of_flight or guess_time(problem, window))
-    ends = (window.low, window.high) if time_of_flight is None else (time_of_flight, time_of_flight)
-    question = _Question(problem, limits, swing_sideways(problem, start), ends)
+    times = window if time_of_flight is None else TimeWindow(time_of_flight, time_of_flight)
+    question = _Question(problem, limits, swing_sideways(problem, start), times)
     chosen = solver or limits.solver
     plan = question.answer(chosen)
     if plan.status.has_flight or solver is not None or chosen == "ipopt":
@@ -137,12 +137,12 @@ def plan_casadi(
 
 @dataclass(frozen=True, eq=False)
 class _Question:
-    """One problem with its first guess and the ends [s] of the time of flight."""
+    """One problem with its first guess and the times of flight that are admitted."""
 
     problem: LandingProblem
     limits: Limits
     start: Trajectory
-    ends: tuple[float, float]
+    times: TimeWindow
 
     def answer(self, solver: NonlinearSolver) -> Plan:
         """Solve it by one solver.
@@ -171,7 +171,7 @@ class _Question:
         try:
             answer = program.solver(
                 x0=_pack(units, problem, self.start, limits.free_time),
-                p=_parameters(problem, units, self.ends, smoothing),
+                p=_parameters(problem, units, self.times, smoothing),
                 lbg=program.lower,
                 ubg=program.upper,
             )
@@ -182,7 +182,7 @@ class _Question:
             limited = stats["unified_return_status"] == "SOLVER_RET_LIMITED"
             status = PlanStatus.LIMIT_REACHED if limited else PlanStatus.SOLVER_FAILED
             return replace(failed, status=status, message=f"{solver}: {stats['return_status']}")
-        time = None if limits.free_time else self.ends[0]
+        time = None if limits.free_time else self.times.low
         flight = _unpack(units, problem, np.array(answer["x"]).ravel(), limits.nodes, time)
         plan = Plan.of_flight(PlanStatus.OPTIMAL, problem, METHOD, flight, solves=1)
         return replace(plan, message=f"{plan.message} ({solver})")

@@ -16,7 +16,7 @@ import math
 import warnings
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -33,12 +33,28 @@ _LINEARISATIONS = 6
 _TIME_TOLERANCE = 2e-3  # relative; the optimum is flat in time
 
 
+class _Limits(NamedTuple):
+    """Which limits a problem has beyond the full thrust and the altitude."""
+
+    min_thrust: bool
+    pointing: bool
+    glide_slope: bool
+    speed: bool
+
+
+class _Model(NamedTuple):
+    """A problem of cvxpy, its parameters and its variables by name."""
+
+    problem: Any
+    parameters: dict[str, Any]
+    variables: dict[str, Any]
+
+
 @lru_cache(maxsize=8)
-def _model(nodes: int, limits: tuple[bool, bool, bool, bool]) -> tuple[Any, dict[str, Any], dict[str, Any]]:
-    """Disciplined-parametrised problem, its parameters and its variables, by name."""
+def _model(nodes: int, limits: _Limits) -> _Model:
+    """Disciplined-parametrised problem of some nodes and limits."""
     import cvxpy as cp
 
-    minimum, pointing, glide, speed = limits
     r, v, u = (cp.Variable((nodes, 3), name=name) for name in "rvu")
     z, s = cp.Variable(nodes), cp.Variable(nodes)
     p = {
@@ -58,30 +74,30 @@ def _model(nodes: int, limits: tuple[bool, bool, bool, bool]) -> tuple[Any, dict
         "speed": cp.Parameter(nonneg=True),
     }
     ones = np.ones((nodes - 1, 1))
-    pull, fall = (cp.reshape(p[name], (1, 3), order="C") for name in ("g_dt", "g_dt2"))
+    g_dt, g_dt2 = (cp.reshape(p[name], (1, 3), order="C") for name in ("g_dt", "g_dt2"))
     rules = [
         r[0] == p["r0"],
         v[0] == p["v0"],
         z[0] == 0,
         r[-1] == 0,
         v[-1] == p["vf"],
-        r[1:] == r[:-1] + p["dt"] * v[:-1] + p["dt2"] * (u[:-1] / 3 + u[1:] / 6) + ones @ fall / 2,
-        v[1:] == v[:-1] + p["dt"] * (u[:-1] + u[1:]) / 2 + ones @ pull,
+        r[1:] == r[:-1] + p["dt"] * v[:-1] + p["dt2"] * (u[:-1] / 3 + u[1:] / 6) + ones @ g_dt2 / 2,
+        v[1:] == v[:-1] + p["dt"] * (u[:-1] + u[1:]) / 2 + ones @ g_dt,
         z[1:] == z[:-1] - p["burn"] * (s[:-1] + s[1:]),
         cp.norm(u, axis=1) <= s,
         cp.multiply(p["mass"], s) <= p["offset"] - z,
         r[1:-1, 2] >= 0,
     ]
-    if minimum:
+    if limits.min_thrust:
         floor = cp.Variable(nodes)  # keeps each product to one parameter
         rules += [floor == p["offset"] - z, cp.multiply(p["mass"], s) >= p["ratio"] * floor]
-    if pointing:
+    if limits.pointing:
         rules.append(u[:, 2] >= p["pointing"] * s)
-    if glide:
+    if limits.glide_slope:
         rules.append(cp.norm(r[:-1, :2], axis=1) <= p["glide"] * r[:-1, 2])
-    if speed:
+    if limits.speed:
         rules.append(cp.norm(v, axis=1) <= p["speed"])
-    return cp.Problem(cp.Minimize(-z[-1]), rules), p, {"r": r, "v": v, "u": u, "z": z, "s": s}
+    return _Model(cp.Problem(cp.Minimize(-z[-1]), rules), p, {"r": r, "v": v, "u": u, "z": z, "s": s})
 
 
 def forget_models() -> None:
@@ -89,8 +105,8 @@ def forget_models() -> None:
     _model.cache_clear()
 
 
-def _limits(problem: LandingProblem) -> tuple[bool, bool, bool, bool]:
-    return (
+def _limits(problem: LandingProblem) -> _Limits:
+    return _Limits(
         problem.lander.min_thrust > 0.0,
         problem.lander.pointing_limit is not None,
         problem.has_glide_slope,
@@ -112,7 +128,8 @@ class _Flight:
     solves: int = 1
 
     @property
-    def share(self) -> float:
+    def log_mass_ratio(self) -> float:
+        """ln(start mass / final mass); infinite without a flight."""
         return -float(self.log_mass[-1]) if self.log_mass.size else math.inf
 
 
@@ -176,7 +193,7 @@ def _solve_best_time(problem: LandingProblem, nodes: int) -> _Flight:
     grid = window.grid()
     flights = [_solve_time(problem, nodes, float(time)) for time in grid]
     solves = sum(flight.solves for flight in flights)
-    at = int(np.argmin([flight.share for flight in flights]))
+    at = int(np.argmin([flight.log_mass_ratio for flight in flights]))
     best = flights[at]
     if not best.log_mass.size:
         return replace(best, solves=solves)
@@ -184,7 +201,8 @@ def _solve_best_time(problem: LandingProblem, nodes: int) -> _Flight:
     a, b = _solve_time(problem, nodes, bracket.first), _solve_time(problem, nodes, bracket.second)
     solves += a.solves + b.solves
     while bracket.high - bracket.low > _TIME_TOLERANCE * bracket.high:
-        if a.share < b.share or (math.isinf(a.share) and math.isinf(b.share) and best.time < b.time):
+        neither = not a.log_mass.size and not b.log_mass.size
+        if a.log_mass_ratio < b.log_mass_ratio or (neither and best.time < b.time):
             bracket, b = keep_lower(bracket), a
             a = _solve_time(problem, nodes, bracket.first)
             solves += a.solves
@@ -192,7 +210,7 @@ def _solve_best_time(problem: LandingProblem, nodes: int) -> _Flight:
             bracket, a = keep_upper(bracket), b
             b = _solve_time(problem, nodes, bracket.second)
             solves += b.solves
-        best = min(best, a, b, key=lambda flight: flight.share)
+        best = min(best, a, b, key=lambda flight: flight.log_mass_ratio)
     return replace(best, solves=solves)
 
 
@@ -213,7 +231,7 @@ def plan_cvxpy(problem: LandingProblem, nodes: int, time_of_flight: float | None
         return Plan(PlanStatus.INFEASIBLE, problem, METHOD, message=cause)
     else:
         flight = _solve_time(problem, nodes, time_of_flight)
-    if flight.log_mass.size and flight.share <= problem.log_mass_ratio + 1e-7:
+    if flight.log_mass.size and flight.log_mass_ratio <= problem.log_mass_ratio + 1e-7:
         trajectory = flight.trajectory
         least = float(np.linalg.norm(trajectory.thrust, axis=1).min())
         if least < (1.0 - 1e-3) * problem.lander.min_thrust:
@@ -221,7 +239,7 @@ def plan_cvxpy(problem: LandingProblem, nodes: int, time_of_flight: float | None
             return Plan(PlanStatus.LIMIT_REACHED, problem, METHOD, message=message, solves=flight.solves)
         return Plan.of_flight(PlanStatus.OPTIMAL, problem, METHOD, trajectory, flight.solves)
     if flight.log_mass.size:
-        needed = problem.state.mass * -math.expm1(-flight.share)
+        needed = problem.state.mass * -math.expm1(-flight.log_mass_ratio)
         message = f"propellant: the cheapest flight found needs {needed:.2f} kg"
         return Plan(PlanStatus.INFEASIBLE, problem, METHOD, message=message, solves=flight.solves)
     failed = "Error" in flight.status or "Panic" in flight.status

@@ -26,19 +26,20 @@ def least_energy_flight(problem: LandingProblem, nodes: int, time: float) -> Tra
     Returns:
         The flight; its mass is a guess.
     """
-    share = np.linspace(0.0, 1.0, nodes)[:, None]
+    fraction = np.linspace(0.0, 1.0, nodes)[:, None]
     start, speed, arrival = problem.offset, problem.state.velocity * time, problem.target_velocity * time
     second, third = -3.0 * start - 2.0 * speed - arrival, 2.0 * start + speed + arrival
-    push = (2.0 * second + 6.0 * third * share) / time**2 - problem.gravity
-    push[:, 2] += 1e-3 * problem.lander.max_thrust / problem.state.mass  # a zero thrust has no direction
+    acceleration = (2.0 * second + 6.0 * third * fraction) / time**2 - problem.gravity
+    # a zero thrust has no direction
+    acceleration[:, 2] += 1e-3 * problem.lander.max_thrust / problem.state.mass
     burnt = np.linspace(0.0, 0.5 * problem.log_mass_ratio, nodes)
     mass = problem.state.mass * np.exp(-burnt)
     return Trajectory(
-        time * share[:, 0],
-        problem.target + start + speed * share + second * share**2 + third * share**3,
-        (speed + 2.0 * second * share + 3.0 * third * share**2) / time,
+        time * fraction[:, 0],
+        problem.target + start + speed * fraction + second * fraction**2 + third * fraction**3,
+        (speed + 2.0 * second * fraction + 3.0 * third * fraction**2) / time,
         mass,
-        push * mass[:, None],
+        acceleration * mass[:, None],
         problem.lander.exhaust_velocity,
     )
 
@@ -75,20 +76,20 @@ def swing_sideways(problem: LandingProblem, flight: Trajectory, in_plane: bool =
 
     A vertical guess is symmetric: no derivative points to either side, and the method stays on the axis. It
     gets a hundredth of full thrust. And a thrust below min_thrust, as a relaxed flight has, is brought up to
-    it by a push to one side and back, a full wave of cosine: landing point and speed stay as they were.
+    it by a thrust to one side and back, a full wave of cosine: landing point and speed stay as they were.
 
     Args:
         problem: the landing problem.
         flight: a guess.
-        in_plane: whether to push towards the target and back, in place of across the way to it.
+        in_plane: whether to thrust towards the target and back, in place of across the way to it.
     """
     thrust = flight.thrust
     size = np.linalg.norm(thrust, axis=1)
     lack = np.sqrt(np.maximum(problem.lander.min_thrust**2 - size**2, 0.0))
-    push = np.maximum(lack, _SWING * problem.lander.max_thrust if is_vertical(problem) else 0.0)
-    if not push.any():
+    swing = np.maximum(lack, _SWING * problem.lander.max_thrust if is_vertical(problem) else 0.0)
+    if not swing.any():
         return flight
     east, north = problem.offset[:2] if problem.offset[:2].any() else (0.0, 1.0)
     side = np.array([east, north, 0.0] if in_plane else [north, -east, 0.0]) / math.hypot(east, north)
     wave = np.cos(np.linspace(0.0, 2.0 * np.pi, size.size))
-    return replace(flight, thrust=thrust + (push * wave)[:, None] * side)
+    return replace(flight, thrust=thrust + (swing * wave)[:, None] * side)

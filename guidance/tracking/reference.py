@@ -1,9 +1,9 @@
 """Flying a plan with thrust held over control periods: a sampled reference, and feedback about it.
 
 The reference is sampled at the control instants. Over each period the feedforward is the mean thrust
-acceleration that takes the reference's velocity from one instant to the next, so that a held thrust keeps its
-pace. The feedback is a discrete linear-quadratic regulator of the double integrator that remains, the same on
-each axis:
+acceleration that takes the reference's velocity from one instant to the next, so that a held thrust has its
+velocity at each. The feedback is a discrete linear-quadratic regulator of the double integrator that
+remains, the same on each axis:
 
     u_k = a_k - K_r (r - r_k) - K_v (v - v_k),    thrust = m u_k / (1 + e),
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -33,9 +34,16 @@ class TrackingWeights:
 DEFAULT_WEIGHTS = TrackingWeights()
 
 
+class TrackingGains(NamedTuple):
+    """Gains of the feedback about a reference: position_gain is K_r [1/s^2], velocity_gain K_v [1/s]."""
+
+    position_gain: float
+    velocity_gain: float
+
+
 @lru_cache(maxsize=32)
-def tracking_gains(control_period: float, weights: TrackingWeights) -> tuple[float, float]:
-    """Gains (K_r [1/s^2], K_v [1/s]) of the discrete regulator of a double integrator with held input.
+def tracking_gains(control_period: float, weights: TrackingWeights) -> TrackingGains:
+    """Gains of the discrete regulator of a double integrator with held input.
 
     Args:
         control_period: [s] above zero.
@@ -45,7 +53,7 @@ def tracking_gains(control_period: float, weights: TrackingWeights) -> tuple[flo
 
     h = finite_number("control_period", control_period, above=0.0)
     motion = np.array([[1.0, h], [0.0, 1.0]])
-    push = np.array([[0.5 * h * h], [h]])
+    held_input = np.array([[0.5 * h * h], [h]])
     cost = np.diag([weights.position**-2, weights.velocity**-2])
-    gain = np.asarray(control.dlqr(motion, push, cost, [[weights.acceleration**-2]])[0])
-    return float(gain[0, 0]), float(gain[0, 1])
+    gain = np.asarray(control.dlqr(motion, held_input, cost, [[weights.acceleration**-2]])[0])
+    return TrackingGains(float(gain[0, 0]), float(gain[0, 1]))

@@ -34,12 +34,12 @@ def shift_landing_point(reference: TrackingReference, site: Array, gravity: Arra
         The deformed descent, with the same duration.
     """
     offset = finite_vector("site", site, 3) - reference.position[-1]
-    share = np.linspace(0.0, 1.0, reference.position.shape[0])[:, None]
-    way = share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
-    pace = 30.0 * share**2 * (1.0 - share) ** 2 / reference.duration
+    s = np.linspace(0.0, 1.0, reference.position.shape[0])[:, None]
+    shifted = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
+    shift_rate = 30.0 * s**2 * (1.0 - s) ** 2 / reference.duration
     return make_reference(
-        reference.position + way * offset,
-        reference.velocity + pace * offset,
+        reference.position + shifted * offset,
+        reference.velocity + shift_rate * offset,
         reference.control_period,
         finite_vector("gravity", gravity, 3),
     )
@@ -59,8 +59,8 @@ def within_thrust(reference: TrackingReference, lander: Lander, mass: float, res
         mass: [kg] at its start; it only falls afterwards.
         reserve: share of the thrust that is left to the feedback.
     """
-    push = np.linalg.norm(reference.thrust_acceleration, axis=1) * mass
-    return bool(push.max() <= (1.0 - reserve) * lander.max_thrust)
+    thrust = np.linalg.norm(reference.thrust_acceleration, axis=1) * mass
+    return bool(thrust.max() <= (1.0 - reserve) * lander.max_thrust)
 
 
 def within_pointing(reference: TrackingReference, lander: Lander, reserve: float) -> bool:
@@ -74,8 +74,8 @@ def within_pointing(reference: TrackingReference, lander: Lander, reserve: float
     if lander.pointing_limit is None:
         return True
     limit = lander.pointing_limit * (1.0 - reserve)
-    push = reference.thrust_acceleration
-    size = np.linalg.norm(push, axis=1)
-    beyond = np.arctan2(np.hypot(push[:, 0], push[:, 1]), push[:, 2]) - limit
+    u = reference.thrust_acceleration
+    size = np.linalg.norm(u, axis=1)
+    beyond = np.arctan2(np.hypot(u[:, 0], u[:, 1]), u[:, 2]) - limit
     taken = size * np.sin(np.clip(beyond, 0.0, 0.5 * np.pi))  # distance from the nearest thrust within it
     return bool(taken.max() <= _UNFELT)

@@ -7,7 +7,8 @@ from typing import NamedTuple
 from guidance.arrays import Array
 from guidance.kernel import compile_kernel
 from guidance.thrust_limits import limit_into
-from guidance.zem_zev import zem_zev_into
+from guidance.tracking.regulator import TrackingGains
+from guidance.zem_zev import ZemZevGains, zem_zev_into
 from hda.flight.held_thrust import (
     FLYING,
     TOUCHDOWN,
@@ -27,13 +28,6 @@ class _ZemZevNumbers(NamedTuple):
     velocity_gain: float
     time_to_go: float
     time_to_go_rate: float
-
-
-class _FeedbackGains(NamedTuple):
-    """About a plan, on position [1/s^2] and velocity [1/s]."""
-
-    position: float
-    velocity: float
 
 
 class _Reference(NamedTuple):
@@ -67,7 +61,7 @@ def _fly_zem_zev(
     """Fly one interval: (nodes written, status, control periods in which the pointing limit acted)."""
     time, path, commanded = log
     period, gravity, vehicle = conditions.period, conditions.gravity, conditions.vehicle
-    gains = (command.position_gain, command.velocity_gain)
+    gains = ZemZevGains(command.position_gain, command.velocity_gain)
     seen = start.copy()
     limited = 0
     periods = commanded.shape[0] - 1
@@ -97,7 +91,7 @@ def _fly_zem_zev(
 def _fly_plan(
     start: Array,
     reference: _Reference,
-    gains: _FeedbackGains,
+    gains: TrackingGains,
     conditions: FlightConditions,
     log: _Log,
 ) -> tuple[int, int, int]:
@@ -126,8 +120,8 @@ def _fly_plan(
             miss = path[k, axis] + navigation[axis] - reference.position[k, axis]
             drift = path[k, 3 + axis] + navigation[3 + axis] - reference.velocity[k, axis]
             acceleration = reference.acceleration[k, axis]
-            acceleration -= gains.position * miss
-            acceleration -= gains.velocity * drift
+            acceleration -= gains.position_gain * miss
+            acceleration -= gains.velocity_gain * drift
             commanded[k, axis] = path[k, 6] * acceleration / (1.0 + estimate)
         if limit_into(commanded[k], vehicle.min_thrust, vehicle.max_thrust, vehicle.pointing_limit):
             limited += 1
@@ -186,4 +180,4 @@ def enter_plan(
     """`_fly_plan` of plain tuples."""
     period, plane, gravity, vehicle, thrust_error, navigation = conditions
     named = FlightConditions(period, plane, gravity, VehicleLimits(*vehicle), thrust_error, navigation)
-    return _fly_plan(start, _Reference(*reference), _FeedbackGains(*gains), named, _Log(*log))
+    return _fly_plan(start, _Reference(*reference), TrackingGains(*gains), named, _Log(*log))

@@ -133,7 +133,9 @@ def fly_interval(
         reference = command.reference
         _check_period(reference.control_period, interval.period)
         parts = (reference.position, reference.velocity, reference.thrust_acceleration)
-        nodes, status, limited = enter_plan(start, parts, command.gains, conditions, log)
+        position_gain, velocity_gain = command.gains
+        gains = (position_gain, velocity_gain)
+        nodes, status, limited = enter_plan(start, parts, gains, conditions, log)
         time_to_go = reference.duration - float(time[nodes - 1])
     return Segment(
         time=time[:nodes],

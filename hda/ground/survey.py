@@ -130,12 +130,12 @@ def _read_strips(
     width = columns[1] - columns[0]
     step = max(_STRIP_ROWS, round(_STRIP / source.pixel_size[0]))
     step = max(1, min(step, _STRIP_PIXELS // width))
-    left, right = max(0, columns[0] - _AROUND), min(source.shape[1], columns[1] + _AROUND)
+    west, east = max(0, columns[0] - _AROUND), min(source.shape[1], columns[1] + _AROUND)
     for first in range(rows[0], rows[1], step):
         last = min(first + step, rows[1])
-        bottom, top = max(0, first - _AROUND), min(source.shape[0], last + _AROUND)
-        block = source.read(bottom, top, left, right)
-        core = (first - bottom, last - bottom, columns[0] - left, columns[1] - left)
+        south, north = max(0, first - _AROUND), min(source.shape[0], last + _AROUND)
+        block = source.read(south, north, west, east)
+        core = (first - south, last - south, columns[0] - west, columns[1] - west)
         yield np.ascontiguousarray(block), core
 
 

@@ -23,7 +23,7 @@ from rl.environment.encoding import CURVED, LATENT_BOUND, LAYOUTS, Layout, encod
 from rl.environment.episode_info import describe_episode
 from rl.environment.episode_source import EpisodeSource
 from rl.inference.arrays import Array32
-from rl.inference.latent import LATENT_SIZE
+from rl.inference.latent import LATENT_SIZE, load_encoder
 
 ObsType = TypeVar("ObsType")
 _DISPERSION_NAMES = tuple(entry.name for entry in fields(Dispersions))
@@ -82,24 +82,44 @@ class LandingEnv(gymnasium.Env[ObsType, Array32], Generic[ObsType]):
         dispersions: Dispersions | None = None,
         action_ranges: ActionRanges = PAPER_ACTIONS,
         render_mode: str | None = None,
+        layout: str = CURVED.name,
     ) -> None:
         """Make the environment; terrain is loaded at the first reset.
 
+        Args:
+            preset: setting to fly.
+            split: tile split.
+            dispersions: factors on the preset's own; None: as in the preset.
+            action_ranges: what -1 and 1 mean.
+            render_mode: None or "rgb_array".
+            layout: which elements describe the flight, a name in `rl.environment.encoding.LAYOUTS`.
+
         Raises:
-            ValueError: unknown preset or render mode, or a split that the preset's terrain does not have.
+            ValueError: unknown preset, layout or render mode, or a split that the preset's terrain does not
+                have.
+            ArtefactError: the shipped encoder is needed, and its weights are missing or damaged.
         """
         if render_mode not in (None, "rgb_array"):
             raise ValueError(f"render_mode must be None or 'rgb_array', got {render_mode!r}")
-        self.source = EpisodeSource(find_preset(preset), split, dispersions or Dispersions())
+        setting = find_preset(preset)
+        self.source = EpisodeSource(setting, split, dispersions or Dispersions())
+        if layout not in LAYOUTS:
+            raise ValueError(f"layout must be one of {', '.join(LAYOUTS)}, got {layout!r}")
+        self.layout: Layout = LAYOUTS[layout]
         self.action_ranges = action_ranges
         self.render_mode = render_mode
         self.action_space = spaces.Box(-1.0, 1.0, (5,), np.float32)
+        self.observation_space = self.make_observation_space(setting)
         self.study_seed: int | None = None
         self.next_episode = 0
         self.scenario: Scenario | None = None
         self.steps: list[Step] = []
         self._flight: Flight | None = None
         self._observation: Observation | None = None
+
+    @abstractmethod
+    def make_observation_space(self, preset: Preset) -> spaces.Space[ObsType]:
+        """The space of what `encode` gives on a preset."""
 
     @abstractmethod
     def encode(self, observation: Observation, nominal_target: Array) -> ObsType:
@@ -203,71 +223,40 @@ class LunarHDAEnv(LandingEnv[Array32]):
     prints them: position, velocity, mass, width twice, target. Rewards, actions and options: `LandingEnv`.
     """
 
-    def __init__(
-        self,
-        preset: str | Preset = "paper",
-        split: str = "train",
-        dispersions: Dispersions | None = None,
-        action_ranges: ActionRanges = PAPER_ACTIONS,
-        render_mode: str | None = None,
-        layout: str = CURVED.name,
-    ) -> None:
-        """Make the environment; the shipped map encoder is loaded.
-
-        Raises:
-            ValueError: unknown preset, split, layout or render mode.
-            ArtefactError: the encoder's weights are missing or damaged.
-        """
-        from rl.inference.latent import load_encoder
-
-        super().__init__(preset, split, dispersions, action_ranges, render_mode)
-        if layout not in LAYOUTS:
-            raise ValueError(f"layout must be one of {', '.join(LAYOUTS)}, got {layout!r}")
-        self.layout: Layout = LAYOUTS[layout]
-        self._encoder = load_encoder()
+    def make_observation_space(self, preset: Preset) -> spaces.Space[Array32]:
+        """A box; the shipped encoder is loaded."""
+        load_encoder()
         bound = np.full(LATENT_SIZE, LATENT_BOUND, np.float32)
         low, high = np.concatenate([self.layout.low, -bound]), np.concatenate([self.layout.high, bound])
-        self.observation_space = spaces.Box(low, high, dtype=np.float32)
+        return spaces.Box(low, high, dtype=np.float32)
 
     def encode(self, observation: Observation, nominal_target: Array) -> Array32:
         """The 44 numbers."""
-        latent = self._encoder.encode(observation.safety_map)
+        latent = load_encoder().encode(observation.safety_map)
         return encode_observation(self.layout, observation, nominal_target, latent)
 
 
 class LunarHDAMapEnv(LandingEnv[dict[str, Any]]):
     """`LunarHDA-Map-v0`: the flight and the raw map, for networks that read the map themselves.
 
-    - `flight`: float32, shape (12,), elements 0-11 of `LunarHDA-v0`;
+    - `flight`: float32, shape (12,), elements 0-11 of `LunarHDA-v0`, by the same `layout`;
     - `map`: uint8, shape (1, 64, 64), the observed safety times 255 (far finer than the sensor's noise);
       channel first, row i grows north, column j east, centred on the current target.
 
     Rewards, actions and options: `LandingEnv`.
     """
 
-    def __init__(
-        self,
-        preset: str | Preset = "paper",
-        split: str = "train",
-        dispersions: Dispersions | None = None,
-        action_ranges: ActionRanges = PAPER_ACTIONS,
-        render_mode: str | None = None,
-    ) -> None:
-        """Make the environment.
-
-        Raises:
-            ValueError: unknown preset, split or render mode.
-        """
-        super().__init__(preset, split, dispersions, action_ranges, render_mode)
-        pixels = find_preset(preset).lidar.pixels
-        self.observation_space = spaces.Dict(
-            flight=spaces.Box(CURVED.low, CURVED.high, dtype=np.float32),
+    def make_observation_space(self, preset: Preset) -> spaces.Space[dict[str, Any]]:
+        """The flight and the map, each a box."""
+        pixels = preset.lidar.pixels
+        return spaces.Dict(
+            flight=spaces.Box(self.layout.low, self.layout.high, dtype=np.float32),
             map=spaces.Box(0, 255, (1, pixels, pixels), np.uint8),
         )
 
     def encode(self, observation: Observation, nominal_target: Array) -> dict[str, Any]:
         """The flight and the map."""
         return {
-            "flight": encode_flight(CURVED, observation, nominal_target),
+            "flight": encode_flight(self.layout, observation, nominal_target),
             "map": np.round(observation.safety_map[None] * 255.0).astype(np.uint8),
         }

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rl.environment.action import CONTROLS
-from rl.settings import AgentSettings, RecurrentSettings
+from rl.settings import AgentSettings, RecurrentSettings, SequenceSettings
 
 if TYPE_CHECKING:
     from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
@@ -20,12 +21,8 @@ def make_agent_with_memory(settings: RecurrentSettings, env: Any, seed: int) -> 
     from rl.learning.recurrent.hyperparameters import Hyperparameters
     from rl.learning.recurrent.td3_lstm import RecurrentTD3
 
-    names = ("memory", "batch_size", "discount", "target_rate", "random_steps", "update_every")
-    names += ("replay_size", "window", "burn_in", "exploration_noise", "smoothing_noise")
-    chosen = {name: getattr(settings, name) for name in names}
-    hyperparameters = Hyperparameters(
-        plus=settings.algorithm == "td3-lstm-plus", head=settings.hidden, **chosen
-    )
+    chosen = {field.name: getattr(settings, field.name) for field in fields(SequenceSettings)}
+    hyperparameters = Hyperparameters(plus=settings.algorithm == "td3-lstm-plus", **chosen)
     agent = RecurrentTD3(env, hyperparameters, seed, settings.learning_rate_at)
     controls = (np.arange(agent.sizes.action) < CONTROLS).astype(np.float32)
     agent.action_prior = lambda step: settings.control_prior_at(step) * controls

@@ -14,6 +14,7 @@ from hda.task.presets import Preset
 from rl.environment.env import LunarHDAEnv
 from rl.inference.artefacts import library_versions
 from rl.learning.algorithms import make_algorithm
+from rl.learning.precision import matmul_precision
 from rl.settings import AgentSettings
 from rl.training.actor_export import actor_card
 from rl.training.checkpoint import newest_checkpoint, restore_checkpoint
@@ -37,12 +38,8 @@ def run_training(
         ValueError: the folder holds a run and `resume` is not set, or holds a run with other settings.
     """
     torch.set_num_threads(1)
-    precision = torch.get_float32_matmul_precision()
-    torch.set_float32_matmul_precision(settings.matmul_precision)
-    try:
+    with matmul_precision(settings.matmul_precision):
         _train(folder, preset, settings, plan, resume)
-    finally:
-        torch.set_float32_matmul_precision(precision)
 
 
 def _train(folder: Path, preset: Preset, settings: AgentSettings, plan: TrainingPlan, resume: bool) -> None:

@@ -72,7 +72,7 @@ class RecurrentAgent:
             env.observation_space.shape[0],
             env.action_space.shape[0],
             settings.memory,
-            settings.head,
+            settings.hidden,
             previous_reward=settings.plus,
         )
         self.networks = ActorCritic.untrained(self.sizes, settings.plus, seed)

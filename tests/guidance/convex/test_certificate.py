@@ -67,15 +67,15 @@ def test_a_spoilt_proof_is_refused(seed):
 
 def test_the_solution_of_a_feasible_problem_proves_nothing():
     solution = task().solve(27.0)
-    proof = FarkasProof(27.0, solution.rows, solution.answer.dual, solution.scaled.reach)
+    proof = FarkasProof(27.0, solution.rows, solution.answer.dual, solution.scaled.unknown_bound)
     assert not proof.verified
 
 
-def test_proofs_survive_scaling_but_not_a_wider_reach():
+def test_proofs_survive_scaling_but_not_a_wider_bound():
     proof = prove_at(task(), 12.0)
     assert isinstance(proof, FarkasProof)
     assert replace(proof, multipliers=1e-6 * proof.multipliers).verified
-    assert not replace(proof, reach=1e15).verified
+    assert not replace(proof, unknown_bound=1e15).verified
 
 
 def test_free_time_names_its_scope():

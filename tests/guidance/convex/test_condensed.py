@@ -40,7 +40,7 @@ def test_any_thrust_expands_to_exact_motion_and_lands_as_the_moments_say(seed, n
     assert constraints.motion(whole, scaled).violation(full) < 1e-12
     assert constraints.start(whole, scaled).violation(full) < 1e-12
     assert burnt_mass(layout, scaled).violation(thrust) < 1e-12
-    miss = landing_moments(layout, scaled).left_over(thrust).ravel()
+    miss = landing_moments(layout, scaled).slack_of(thrust).ravel()
     np.testing.assert_allclose(-miss[:3], full[whole.position[-1]], atol=1e-12)
     np.testing.assert_allclose(-miss[3:], full[whole.velocity[-1]], atol=1e-12)
 

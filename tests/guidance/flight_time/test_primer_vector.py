@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from descents import GRAVITY, TARGET, feasible_start, harsh_start, paper_start
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 import guidance
@@ -57,7 +57,7 @@ def check_optimality(problem: LandingProblem, flight: PrimerFlight):
     scale = float(np.abs(problem.offset).max())
     assert np.linalg.norm(end.position - problem.target) < 1e-5 * scale
     assert np.linalg.norm(end.velocity) < 1e-5 * scale / flight.time
-    assert end.mass == pytest.approx(problem.state.mass * math.exp(-flight.propellant_share), rel=1e-9)
+    assert end.mass == pytest.approx(problem.state.mass * math.exp(-flight.log_mass_ratio), rel=1e-9)
     (begin, stop), (q1, q2) = flight.primer_times, flight.primer
     slope = (q2 - q1) / (stop - begin)
     for time in (flight.first_burn, 0.5 * (flight.first_burn + flight.braking), flight.braking):
@@ -103,7 +103,7 @@ def test_time_and_propellant_are_those_of_the_convex_optimum():
         best = search.run(guess_time(problem, window))
         assert best is not None
         worst_time = max(worst_time, abs(best.time - flight.time))
-        extra.append(1200.0 * (math.exp(-flight.propellant_share) - math.exp(-best.value)))
+        extra.append(1200.0 * (math.exp(-flight.log_mass_ratio) - math.exp(-best.value)))
     assert worst_time < 0.2
     assert min(extra) > 0.0
     assert max(extra) < 0.01
@@ -138,7 +138,7 @@ def test_where_nothing_but_burning_is_left_the_plan_is_found_all_the_same():
     plan = guidance.solve_pdg(here, TARGET)
     assert plan.status is PlanStatus.OPTIMAL
     assert plan.time_of_flight == pytest.approx(flight.time - later, abs=0.05)
-    end = 1200.0 * math.exp(-flight.propellant_share)
+    end = 1200.0 * math.exp(-flight.log_mass_ratio)
     assert end - 0.05 < plan.mass[-1] < end + 1e-3
 
 
@@ -195,6 +195,21 @@ def test_any_state_gives_an_answer_and_no_exception(position, velocity, gravity)
     problem = LandingProblem(state, TARGET, PAPER_LANDER, np.array(gravity))
     flight = find_primer_flight(problem)
     assert flight is None or 0.0 <= flight.first_burn < flight.braking < flight.time < math.inf
+
+
+@given(
+    exponent=st.floats(-323.0, 0.0),
+    side=st.floats(-1e4, 1e4),
+    velocity=st.tuples(st.floats(-1e-3, 1e-3), st.floats(-1e-3, 1e-3)),
+)
+@example(exponent=-200.0, side=10.0, velocity=(0.0, 0.0))  # its primer is too long for floating point
+@example(exponent=-320.0, side=1e4, velocity=(0.0, 0.0))
+def test_next_to_the_plane_of_the_target_there_is_a_flight_or_none(exponent, side, velocity):
+    state = State(np.array([side, 0.0, 10.0**exponent]), np.array([velocity[0], 0.0, velocity[1]]), 1200.0)
+    flight = find_primer_flight(LandingProblem(state, np.zeros(3), PAPER_LANDER, GRAVITY))
+    assert flight is None or 0.0 <= flight.first_burn < flight.braking < flight.time < math.inf
+    if exponent < -150.0 and abs(side) > 1.0 and velocity == (0.0, 0.0):
+        assert flight is None
 
 
 def test_one_solve_settles_almost_every_paper_start():

@@ -151,6 +151,15 @@ def test_unseeded_environments_differ():
 
 
 @pytest.mark.parametrize("layout", [CURVED, RELATIVE, PRINTED], ids=lambda layout: layout.name)
+def test_both_environments_describe_the_flight_alike(layout):
+    scenario = sample_scenario("paper", 0, 1, "train")
+    options = {"scenario": scenario}
+    vector, _ = LunarHDAEnv(layout=layout.name).reset(options=options)
+    seen, _ = LunarHDAMapEnv(layout=layout.name).reset(options=options)
+    assert np.array_equal(seen["flight"], vector[:12])
+
+
+@pytest.mark.parametrize("layout", [CURVED, RELATIVE, PRINTED], ids=lambda layout: layout.name)
 def test_no_element_is_constant_but_the_listed_ones(layout):
     env = LunarHDAEnv(layout=layout.name)
     rng = np.random.default_rng(0)

@@ -67,7 +67,7 @@ REFUSED = {
 
 
 def make_recurrent(env: Any) -> RecurrentTD3:
-    return RecurrentTD3(env, replace(SETTINGS, random_steps=4, batch_size=2, memory=4, head=(4,)), 0)
+    return RecurrentTD3(env, replace(SETTINGS, random_steps=4, batch_size=2, memory=4, hidden=(4,)), 0)
 
 
 def make_recipe(env: Any, name: str) -> Any:

@@ -111,6 +111,7 @@ def test_fast_update_equals_that_of_sb3(tmp_path):
     from stable_baselines3 import TD3
 
     from rl.environment.env import LunarHDAEnv
+    from rl.learning.precision import matmul_precision
     from rl.learning.td3 import FastTD3
 
     rng = np.random.default_rng(0)
@@ -131,10 +132,10 @@ def test_fast_update_equals_that_of_sb3(tmp_path):
             action = np.clip(data[2][k], -1, 1)
             done = np.array([k % 8 == 7])
             model.replay_buffer.add(data[0][k], data[1][k], action, np.array([0.1 * k]), done, [{}])
-        torch.set_float32_matmul_precision("highest")
         torch.manual_seed(5)
         np.random.seed(5)  # noqa: NPY002 - SB3's replay memory draws from it
-        model.train(6, 32)
+        with matmul_precision("highest"):
+            model.train(6, 32)
         models.append(model)
     for a, b in zip(models[0].policy.parameters(), models[1].policy.parameters(), strict=True):
         torch.testing.assert_close(a, b, rtol=2e-5, atol=2e-6)

@@ -1,0 +1,132 @@
+"""An extremal of the least-propellant descent: a burn, a coast and a burn along a primer affine in time.
+
+`guidance.flight_time.primer_equations` says which of them is the answer; this is how one is flown.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from guidance.arrays import Array
+from guidance.kernel import compile_kernel
+
+_POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(8)
+LEGS = 6
+"""Parts of an arc in a flown path."""
+
+
+class PrimerProblem(NamedTuple):
+    """What is flown, with the origin at the target.
+
+    `solve_primer` takes the first three divided by full thrust over start mass: seconds are the only unit.
+
+    Attributes:
+        position: at the start, shape (3,).
+        velocity: at the start, shape (3,).
+        gravity: shape (3,).
+        mass_flow: share of the start mass that full thrust burns in a unit of time.
+    """
+
+    position: Array
+    velocity: Array
+    gravity: Array
+    mass_flow: float
+
+
+class Extremal(NamedTuple):
+    """The seven unknowns: two unit vectors and three times; its arrays are changed in place.
+
+    Attributes:
+        primer: unit vectors q1 and q2 of the primer at the switches, shape (2, 3).
+        times: end of the first burn t1, start of the last t2, end of the flight T, shape (3,).
+    """
+
+    primer: Array
+    times: Array
+
+
+class Burn(NamedTuple):
+    """Full thrust for a while.
+
+    Attributes:
+        begin: time at which it begins.
+        end: time at which it ends.
+        mass: at its begin, in start masses.
+    """
+
+    begin: float
+    end: float
+    mass: float
+
+
+class PrimerPath(NamedTuple):
+    """A flown extremal at the ends of equal parts of its arcs, from the start to the landing.
+
+    Attributes:
+        position: shape (3 LEGS + 1, 3).
+        velocity: shape (3 LEGS + 1, 3).
+        direction: unit vectors of the primer, shape (3 LEGS + 1, 3).
+    """
+
+    position: Array
+    velocity: Array
+    direction: Array
+
+
+@compile_kernel
+def _primer_at(x: Extremal, time: float, p: Array) -> None:
+    """Primer vector at a time."""
+    fraction = (time - x.times[0]) / (x.times[1] - x.times[0])
+    for axis in range(3):
+        p[axis] = x.primer[0, axis] + (x.primer[1, axis] - x.primer[0, axis]) * fraction
+
+
+@compile_kernel
+def add_burn(x: Extremal, burn: Burn, mass_flow: float, then: float, out: Array) -> None:
+    """Add to out = (r, v), at the time `then`, what a burn contributes; Gauss-Legendre quadrature."""
+    half = 0.5 * (burn.end - burn.begin)
+    p = np.empty(3)
+    for k in range(_POINTS.size):
+        elapsed = half * (1.0 + _POINTS[k])
+        _primer_at(x, burn.begin + elapsed, p)
+        size = math.sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2])
+        impulse = half * _WEIGHTS[k] / ((burn.mass - mass_flow * elapsed) * max(size, 1e-12))
+        for axis in range(3):
+            gain = impulse * p[axis]
+            out[3 + axis] += gain
+            out[axis] += gain * (then - burn.begin - elapsed)
+
+
+@compile_kernel
+def fly_extremal(x: Extremal, problem: PrimerProblem) -> PrimerPath:
+    """States and primers along a flight, in the units of `solve_primer`."""
+    _, _, g, flow = problem
+    first = max(x.times[0], 0.0)
+    ends = np.array([0.0, first, x.times[1], x.times[2]])
+    points = 3 * LEGS + 1
+    path = PrimerPath(np.empty((points, 3)), np.empty((points, 3)), np.empty((points, 3)))
+    state, p, time, mass = np.empty(6), np.empty(3), 0.0, 1.0
+    for axis in range(3):
+        state[axis], state[3 + axis] = problem.position[axis], problem.velocity[axis]
+    for k in range(points):
+        _primer_at(x, time, p)
+        size = max(math.sqrt(p @ p), 1e-12)
+        for axis in range(3):
+            path.position[k, axis], path.velocity[k, axis] = state[axis], state[3 + axis]
+            path.direction[k, axis] = p[axis] / size
+        arc, part = k // LEGS, k % LEGS
+        if arc == 3:
+            break
+        step = (ends[arc + 1] - ends[arc]) / LEGS
+        then = ends[arc] + (part + 1) * step
+        for axis in range(3):
+            state[axis] += state[3 + axis] * step + 0.5 * step * step * g[axis]
+            state[3 + axis] += step * g[axis]
+        if arc != 1:
+            add_burn(x, Burn(time, then, mass), flow, then, state)
+            mass -= flow * (then - time)
+        time = then
+    return path
