@@ -19,10 +19,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from guidance.arrays import Array
 from guidance.validation import finite_number
 from studies.stability.held_loop import Gains
-
-Array = NDArray[np.float64]
 
 
 def flight_powers(gains: Gains) -> NDArray[np.complex128]:

@@ -1,5 +1,6 @@
 """The cheap estimate of a landing's propellant: closed forms, a slow search, and `solve_pdg`."""
 
+import itertools
 import math
 
 import numpy as np
@@ -12,7 +13,6 @@ from guidance import PAPER_LANDER, Lander, State, solve_pdg
 from guidance.two_impulse import divert_cost
 
 MIGHTY = Lander(dry_mass=1150.0, max_thrust=1e9, specific_impulse=325.0)
-PULL = 1.62
 
 
 def estimate(state: State, x: float, y: float, lander: Lander = PAPER_LANDER) -> float:
@@ -25,12 +25,15 @@ def impulsive(time: float, state: State, site: np.ndarray) -> float:
     return float(np.linalg.norm(first - state.velocity) + np.linalg.norm(first + GRAVITY * time))
 
 
-def test_straight_above_it_is_free_fall_and_one_brake():
+@pytest.mark.parametrize("gravity", [0.05, 1.62, 9.81])
+def test_straight_above_it_is_free_fall_and_one_brake(gravity):
     height, sink = 400.0, 20.0
     state = State(np.array([0.0, 0.0, 50.0 + height]), np.array([0.0, 0.0, -sink]), 1190.0)
-    speed = math.sqrt(sink**2 + 2.0 * PULL * height)
+    speed = math.sqrt(sink**2 + 2.0 * gravity * height)
     expected = 1190.0 * -math.expm1(-speed / MIGHTY.exhaust_velocity)
-    assert estimate(state, 0.0, 0.0, MIGHTY) == pytest.approx(expected, rel=1e-5)
+    below = np.zeros(1)
+    price = divert_cost(state, below, below, 50.0, MIGHTY, (0.0, 0.0, -gravity))[0, 0]
+    assert price == pytest.approx(expected, rel=1e-5)
 
 
 @settings(max_examples=50)
@@ -72,5 +75,8 @@ def test_what_it_cannot_price_is_refused_by_name():
     axis = np.zeros(1)
     with pytest.raises(ValueError, match="altitude 40 m must be above the plane"):
         divert_cost(state, axis, axis, 50.0, PAPER_LANDER, GRAVITY)
-    with pytest.raises(ValueError, match="gravity must point along -z"):
-        divert_cost(state, axis, axis, 0.0, PAPER_LANDER, (0.1, 0.0, -1.62))
+    for gravity in itertools.product((-0.1, 0.0, 0.1), (-0.1, 0.0, 0.1), (-1.62, 0.0, 1.62)):
+        if gravity == (0.0, 0.0, -1.62):
+            continue
+        with pytest.raises(ValueError, match="gravity must point along -z"):
+            divert_cost(state, axis, axis, 0.0, PAPER_LANDER, gravity)
