@@ -55,7 +55,6 @@ RUNS: dict[str, tuple[list[str], list[str]]] = {
     "studies.sample_size": ([], []),
     "studies.scale": ([*SMALL, "--out", "scaled"], ["scaled/table.csv"]),
     "studies.stability": (["--gain-points", "2", "--out", "stable"], ["stable/stability.png"]),
-    "studies.terrain_timing": (["--repeats", "1", "--size", "200"], []),
     "studies.timing": (["--starts", "1", "--out", "timed"], ["timed/timing.csv", "timed/timing.png"]),
     "studies.trade_off": (
         [*SMALL, "--presets", "paper", "--weights", "none", "--policies", "no-divert", "--out", "traded"],

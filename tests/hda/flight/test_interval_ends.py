@@ -17,6 +17,7 @@ from guidance import Lander, State, time_to_go
 from guidance.lander import PAPER_LANDER
 from guidance.tracking.reference import TrackingReference
 from guidance.tracking.soft_landing import plan_soft_landing
+from hda.flight import vehicle
 from hda.flight.vehicle import ControlPeriods, FlightErrors, FlightStatus, Segment, fly_interval
 from hda.policy import Command, Decision, PlanCommand, ZemZevCommand
 
@@ -101,6 +102,22 @@ def test_what_is_left_of_a_plan_is_what_was_not_flown(periods: int, reference: T
     landed = fly(last, PlanCommand(rest, (0.9, 1.7)), 10)
     assert landed.status is FlightStatus.TOUCHDOWN
     assert landed.time_to_go == rest.duration - landed.time[-1]
+
+
+@pytest.mark.parametrize("law", [0, 1])
+def test_every_number_of_a_segment_is_written(
+    law: int, reference: TrackingReference, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Fresh memory often holds zeros, which hide a number that nothing wrote."""
+    command = commands(reference)[law]
+    state = State(SITE + np.array([0.0, 0.0, 12.0]), np.array([0.0, 0.0, -5.0]), 1190.0)
+    plain = [fly(state, command, periods) for periods in (2, 10)]
+    monkeypatch.setattr(vehicle.np, "empty", lambda shape: np.full(shape, np.nan))
+    for periods, segment in zip((2, 10), plain, strict=True):
+        again = fly(state, command, periods)
+        assert np.array_equal(again.time, segment.time)
+        assert np.array_equal(again.path, segment.path)
+        assert np.array_equal(again.commanded, segment.commanded)
 
 
 def test_what_a_flight_gives_cannot_be_changed() -> None:
