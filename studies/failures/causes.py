@@ -17,13 +17,14 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from hda.flight.episode import fly, ground_point
+from guidance.state import State
+from hda.flight.episode import fly
 from hda.flight.outcome import Ending
 from hda.flight.record import EpisodeRecord
 from hda.policies.privileged.knowable_ground import KnowableGround
 from hda.task.observation import Observation
 from hda.task.presets import Preset
-from hda.task.scenario import Scenario
+from hda.task.scenario import Scenario, ground_point
 from studies.campaign.monte_carlo import Study
 
 SAFE_READING = 0.5
@@ -113,8 +114,10 @@ def count_safe_cells(record: EpisodeRecord) -> tuple[int, int]:
         where = np.argwhere(read)
         cells = {(int(rows[i]), int(columns[j])) for i, j in where if truth[rows[i], columns[j]]}
         seen |= cells
+        aim = ground_point(scenario, observation.target)
+        state = _true_state(scenario, observation.state)
         ground = KnowableGround(
-            observation.state, observation.target, observation.width, scenario.view, _soft(scenario.preset)
+            state, aim, observation.width, scenario.view, scenario.preset.rules.soft_speed
         )
         plane = float(observation.target[2])
         reached |= {
@@ -125,8 +128,10 @@ def count_safe_cells(record: EpisodeRecord) -> tuple[int, int]:
     return len(seen), len(reached)
 
 
-def _soft(preset: Preset) -> float:
-    return preset.rules.soft_speed
+def _true_state(scenario: Scenario, estimate: State) -> State:
+    """The state that the lander estimates so."""
+    error = scenario.navigation_error
+    return State(estimate.position - error[:3], estimate.velocity - error[3:], estimate.mass)
 
 
 def last_reading(record: EpisodeRecord) -> tuple[int, float, bool] | None:

@@ -20,6 +20,7 @@ from rich.progress import track
 from guidance.console import tolerate_encoding
 from guidance.validation import finite_number, unknown_name
 from hda.flight.episode import fly
+from hda.flight.outcome import ENDINGS
 from hda.task.presets import PRESETS, Preset
 from hda.task.scenario import sample_scenario
 from studies.campaign.command_line import one_line_errors, open_folder
@@ -27,7 +28,6 @@ from studies.campaign.monte_carlo import Study
 from studies.campaign.provenance import describe_run, write_provenance
 from studies.campaign.shards import read_shard
 from studies.columns import Column, field_columns, write_csv
-from studies.compare.flights import ENDINGS
 from studies.failures.causes import Cause, Failure, explain_failure, find_remedies
 
 

@@ -6,8 +6,8 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from hda.flight.palette import COLORS
 from studies.columns import Column, Output, markdown_lines
-from studies.compare.figures import COLORS
 from studies.memory.answer import MEASURES, GroupRow
 from studies.memory.scores import AgentScore
 

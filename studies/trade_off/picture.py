@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from studies.compare.figures import COLORS
+from hda.flight.palette import COLORS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
