@@ -7,6 +7,7 @@ X bounds every unknown of any flight that keeps the thrust bounds and the dry ma
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -64,6 +65,10 @@ class FarkasProof:
     def verified(self) -> bool:
         """Whether the proof holds."""
         return self.margin > 0.0
+
+    def supports(self, lower_bound: float) -> bool:
+        """Whether `lower_bound` [kg] says that there is no flight of this duration."""
+        return math.isinf(lower_bound)
 
     @property
     def causes(self) -> tuple[str, ...]:

@@ -15,6 +15,10 @@ class Proof(Protocol):
         """Whether the proof holds."""
         ...
 
+    def supports(self, lower_bound: float) -> bool:
+        """Whether the proof, if it holds, implies that no flight burns less [kg]; inf: that there is none."""
+        ...
+
 
 @dataclass(frozen=True, eq=False)
 class Certificate:
@@ -35,5 +39,5 @@ class Certificate:
 
     @property
     def verified(self) -> bool:
-        """Whether every proof holds."""
-        return all(proof.verified for proof in self.proofs)
+        """Whether every proof holds, and implies the lower bound."""
+        return all(proof.supports(self.lower_bound) and proof.verified for proof in self.proofs)

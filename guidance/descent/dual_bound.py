@@ -8,8 +8,8 @@ times of flight. For every flight of T seconds that spends at most J (see `DualB
 
 with f and l the greatest and least thrust over the start mass, c the exhaust velocity, kappa =
 (e^(J/c) - 1)/J and h(p) the greatest p.d over the directions that the engine may point along;
-`guidance.lower_bound` derives it. The check integrates this in plain numpy and shares nothing with the search
-for the primers.
+`guidance.lower_bound` derives it. The check shares no code with the search for the primers. It takes chords
+of h(p(tau)), which is convex: they lie above it, so that what the check computes is a bound on any grid.
 """
 
 from __future__ import annotations
@@ -22,8 +22,9 @@ import numpy as np
 from guidance.arrays import Array
 from guidance.descent.problem import LandingProblem
 
-_STEP = 1e-3  # of the longest finite time of flight
-_ALLOWANCE = 1e-7  # of the exhaust velocity: the integration's error, 0.1 g of 1200 kg
+_EVEN, _RISING, _INSIDE = 600, 300, 200  # marks of a piece: even from 0 on, ever wider, and within its span
+_ROUNDING = 1e-9  # of the exhaust velocity
+_MOST_RATIO = 50.0  # of velocity change over exhaust velocity: no vehicle spends more
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,81 +71,123 @@ class DualBound:
     @property
     def verified(self) -> bool:
         """Whether the proof holds: the pieces follow one another, and each bounds all of its times."""
-        if not self.pieces or not self.bound <= self.spent_at_most:
+        if not self._well_formed():
             return False
+        claim = self.bound - _ROUNDING * self.problem.lander.exhaust_velocity
+        return all(self._least_bound(piece) >= claim for piece in self.pieces)
+
+    def supports(self, lower_bound: float) -> bool:
+        """Whether the claim implies that no flight burns less than `lower_bound` [kg]; inf: there is none."""
+        if math.isfinite(lower_bound):
+            return lower_bound <= self.propellant * (1.0 + 1e-12)
+        tank = self.problem.lander.exhaust_velocity * self.problem.log_mass_ratio
+        return self.shortest == 0.0 and math.isinf(self.longest) and self.bound >= tank * (1.0 - 1e-6)
+
+    def _well_formed(self) -> bool:
+        """Whether the numbers are numbers, and the pieces cover the claimed times without a hole."""
         marks = [self.shortest, *(piece.end for piece in self.pieces)]
-        if marks[-1] != self.longest or marks[:-1] != [piece.begin for piece in self.pieces]:
+        numbers = [self.bound, self.spent_at_most, *marks[:-1]]
+        numbers += [float(number) for piece in self.pieces for number in piece.primer]
+        if not self.pieces or not all(math.isfinite(number) for number in numbers):
             return False
-        allowance = _ALLOWANCE * self.problem.lander.exhaust_velocity
-        return bool(self._least_bounds().min() >= self.bound - allowance)
+        chained = marks[:-1] == [piece.begin for piece in self.pieces] and marks[-1] == self.longest
+        rising = all(first <= second for first, second in zip([0.0, *marks], marks, strict=False))
+        most = _MOST_RATIO * self.problem.lander.exhaust_velocity
+        return chained and rising and 0.0 < self.spent_at_most < most and self.bound <= self.spent_at_most
 
-    def _least_bounds(self) -> Array:
-        """[m/s] the least D of each piece, shape (k,)."""
-        horizon = max(piece.begin if math.isinf(piece.end) else piece.end for piece in self.pieces)
-        times = np.linspace(0.0, horizon, math.ceil(1.0 / _STEP) + 1)
-        marks = np.unique(np.concatenate([times, [piece.begin for piece in self.pieces]]))
-        bounds, sag = self._bounds(marks)
-        least = np.empty(len(self.pieces))
-        for k, piece in enumerate(self.pieces):
-            inside = (marks >= piece.begin) & (marks <= piece.end)
-            cells = inside[1:] & inside[:-1]
-            lower = np.minimum(bounds[1:, k], bounds[:-1, k])[cells] - sag[cells, k]
-            least[k] = min(float(bounds[inside, k].min()), float(lower.min(initial=math.inf)))
-            if math.isinf(piece.end) and not self._rises_for_ever(piece):
-                least[k] = -math.inf
-        return least
-
-    @property
-    def _growth(self) -> float:
-        """[1/s] f kappa."""
-        exhaust = self.problem.lander.exhaust_velocity
-        chord = math.expm1(self.spent_at_most / exhaust) / self.spent_at_most
-        return self.problem.lander.max_thrust / self.problem.state.mass * chord
+    def _least_bound(self, piece: DualPiece) -> float:
+        """[m/s] the least D over a piece's times of flight."""
+        endless = math.isinf(piece.end)
+        if endless and not self._rises_for_ever(piece):
+            return -math.inf
+        end = piece.begin if endless else piece.end
+        marks = np.unique(
+            np.concatenate(
+                [
+                    np.linspace(0.0, end, _EVEN),
+                    end * np.geomspace(1e-5, 1.0, _RISING),
+                    np.linspace(piece.begin, end, _INSIDE),
+                ]
+            )
+        )
+        bounds, sag = self._bounds(piece.primer, marks)
+        inside = marks >= piece.begin
+        cells = inside[1:] & inside[:-1]
+        between = np.minimum(bounds[1:], bounds[:-1])[cells] - sag[cells]
+        return min(float(bounds[inside].min()), float(between.min(initial=math.inf)))
 
     def _rises_for_ever(self, piece: DualPiece) -> bool:
-        """Whether D of a constant primer no longer than one grows with T: it is linear."""
+        """Whether D of a constant primer no longer than one does not fall with T: it is linear."""
         constant = not piece.primer[3:].any() and bool(np.linalg.norm(piece.primer[:3]) <= 1.0 + 1e-12)
         return constant and float(piece.primer[:3] @ self.problem.gravity) <= 0.0
 
-    def _bounds(self, times: Array) -> tuple[Array, Array]:
-        """D of every piece at rising times from 0, shape (n, k), and what it may sag between, (n - 1, k).
+    def _bounds(self, primer: Array, times: Array) -> tuple[Array, Array]:
+        """D at rising times from 0, shape (n,), and what it may sag between them, shape (n - 1,).
 
-        By the classical Runge-Kutta method. Between two times D falls below its ends by at most an eighth of
-        the step squared times the greatest second derivative, -b.g - (f or l) s', where h' only rises.
+        Between two times D falls below its ends by at most an eighth of the step squared times the greatest
+        second derivative, -b.g - (f or l) s'; on a chord s' = h' + (f kappa or l/c) s, and s is monotone.
         """
-        problem, mass = self.problem, self.problem.state.mass
-        primers = np.array([piece.primer for piece in self.pieces])
-        a, b = primers[:, :3], primers[:, 3:]
-        full, least = problem.lander.max_thrust / mass, problem.lander.min_thrust / mass
-        growth, least_growth = self._growth, least / problem.lander.exhaust_velocity
-        middle = np.sort(np.concatenate([times, 0.5 * (times[1:] + times[:-1])]))
-        reach = _support(a + middle[:, None, None] * b, problem.lander.pointing_limit)
-
-        def rate(length: Array, spent: Array) -> Array:
-            switching = length - 1.0 + growth * spent[0] - least_growth * spent[1]
-            return np.array([np.maximum(switching, 0.0), np.maximum(-switching, 0.0)])
-
-        integral = np.zeros((times.size, 2, len(self.pieces)))
-        for k, step in enumerate(np.diff(times)):
-            here, centre, there = reach[2 * k : 2 * k + 3]
-            first = rate(here, integral[k])
-            second = rate(centre, integral[k] + 0.5 * step * first)
-            third = rate(centre, integral[k] + 0.5 * step * second)
-            fourth = rate(there, integral[k] + step * third)
-            integral[k + 1] = integral[k] + step / 6.0 * (first + 2.0 * second + 2.0 * third + fourth)
+        problem = self.problem
+        reach = _support(primer[:3] + times[:, None] * primer[3:], problem.lander.pointing_limit)
+        steps = np.diff(times)
+        slopes = np.diff(reach) / steps
+        thrust = _ThrustBounds.of(problem, self.spent_at_most)
+        switching, spent = np.full(times.size, reach[0] - 1.0), np.zeros(times.size)
+        for k in range(steps.size):
+            s, more = thrust.advance(float(switching[k]), float(slopes[k]), float(steps[k]))
+            switching[k + 1], spent[k + 1] = s, spent[k] + more
         column, v, g = times[:, None], problem.state.velocity, problem.gravity
         speed = (problem.target_velocity - v) - column * g
         place = problem.offset + column * v + 0.5 * column**2 * g
-        bounds = speed @ a.T - place @ b.T - full * integral[:, 0] + least * integral[:, 1]
-        step = np.diff(times)[:, None]
-        nodes = reach[::2]
-        slope = np.vstack([-np.linalg.norm(b, axis=1)[None, :], np.diff(nodes, axis=0) / step])[:-1]
-        switching = nodes - 1.0 + growth * integral[:, 0] - least_growth * integral[:, 1]
-        highest = np.maximum(switching[1:], switching[:-1])  # s has no maximum between
-        lowest = np.minimum(switching[1:], switching[:-1]) - step * np.linalg.norm(b, axis=1)
-        weight = np.where(highest > -1e-9, full, least)
-        bend = -b @ g + weight * (np.maximum(-slope, 0.0) + growth * np.maximum(-lowest, 0.0))
-        return bounds, 0.125 * step**2 * np.maximum(bend, 0.0)
+        lowest = np.minimum(switching[1:], switching[:-1])
+        falling = np.maximum(-slopes, 0.0) + thrust.full_growth * np.maximum(-lowest, 0.0)
+        burning = np.maximum(switching[1:], switching[:-1]) > 0.0
+        bend = -float(primer[3:] @ g) + np.where(burning, thrust.full, thrust.least) * falling
+        bounds = speed @ primer[:3] - place @ primer[3:] - spent
+        return bounds, 0.125 * steps**2 * np.maximum(bend, 0.0)
+
+
+@dataclass(frozen=True)
+class _ThrustBounds:
+    """f, f kappa, l and l/c of the relaxed thrust bounds."""
+
+    full: float
+    full_growth: float
+    least: float
+    least_growth: float
+
+    @classmethod
+    def of(cls, problem: LandingProblem, most: float) -> _ThrustBounds:
+        exhaust, mass = problem.lander.exhaust_velocity, problem.state.mass
+        full, least = problem.lander.max_thrust / mass, problem.lander.min_thrust / mass
+        return cls(full, full * math.expm1(most / exhaust) / most, least, least / exhaust)
+
+    def advance(self, s: float, slope: float, step: float) -> tuple[float, float]:
+        """S after a step on which h has a constant slope, and the growth of int (f mu - l nu) over it."""
+        spent, remaining = 0.0, step
+        while remaining > 0.0:
+            burning = s > 0.0 or (s == 0.0 and slope > 0.0)
+            weight = self.full if burning else self.least
+            rate = self.full_growth if burning else self.least_growth
+            duration = remaining
+            end = s + (slope + rate * s) * _growth(rate, duration)
+            crosses = end < 0.0 if burning else end > 0.0
+            if crosses:
+                duration = -math.log1p(rate * s / slope) / rate if rate > 0.0 else -s / slope
+                duration, end = min(max(duration, 0.0), remaining), 0.0
+            if rate * duration > 1e-4:
+                area = (end - s - slope * duration) / rate
+            else:
+                bent = rate * duration / 3.0
+                area = duration * (s * (1.0 + 1.5 * bent) + 0.5 * slope * duration * (1.0 + bent))
+            spent += weight * area
+            s, remaining = end, remaining - duration if crosses else 0.0
+        return s, spent
+
+
+def _growth(rate: float, time: float) -> float:
+    """[s] (e^{rate time} - 1)/rate."""
+    return math.expm1(rate * time) / rate if rate > 0.0 else time
 
 
 def _support(primer: Array, limit: float | None) -> Array:

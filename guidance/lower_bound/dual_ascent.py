@@ -26,7 +26,6 @@ _MOST_ITERATIONS = 60
 _DIFFERENCE = 1e-6  # of the primer, for the second derivative
 _LEAST_DAMPING = 1e-9  # of the curvature that full thrust over the whole flight has
 _TRUSTED_DAMPING = 1e-3  # below it a step's promise is the distance to the maximum
-_FIRST_SCALE = 1.1  # of the first primer: its thrust has to burn somewhere
 
 
 class Ascent(NamedTuple):
@@ -96,8 +95,8 @@ def two_impulse_primer(time: float, case: DualCase) -> Array:
         after = -case.position[axis] / time - 0.5 * fall
         first[axis] = after - case.velocity[axis]
         last[axis] = case.arrival[axis] - after - fall
-    first *= _FIRST_SCALE / max(math.sqrt(first @ first), 1e-300)
-    last *= _FIRST_SCALE / max(math.sqrt(last @ last), 1e-300)
+    first /= max(math.sqrt(first @ first), 1e-300)
+    last /= max(math.sqrt(last @ last), 1e-300)
     primer[:3], primer[3:] = last, (first - last) / time
     return primer
 

@@ -12,17 +12,19 @@ from guidance.descent.certificate import Certificate
 from guidance.descent.dual_bound import DualBound, DualPiece
 from guidance.descent.problem import LandingProblem
 from guidance.flight_time.primer_vector import PrimerFlight
-from guidance.lower_bound.dual_ascent import ascend, two_impulse_primer
+from guidance.lower_bound.dual_ascent import two_impulse_primer
 from guidance.lower_bound.dual_case import DualCase, dual_case
 from guidance.lower_bound.dual_function import sweep_bound
-from guidance.lower_bound.time_cover import CoverAim, TimeCover, cover_times
+from guidance.lower_bound.time_cover import CoverAim, TimeCover, best_primer, cover_times
 
 _CELLS = 240  # of the grid of times, up to the time to begin with; as wide up to _UNIFORM of it
 _UNIFORM = 2.5
 _NEAR = np.array([0.02, 0.05, 0.1, 0.2, 0.35, 0.6])  # of a cell: there the least propellant may have a kink
-_STRETCH = 1.02  # ratio of times beyond
-_LONGEST = 50.0  # times the first: the last one proved where no gravity ends the grid
+_STRETCH = 1.03  # ratio of times beyond
+_LONGEST = 1e4  # times the first: the last one of the grid where gravity is too weak to end it
 _FIRST_SCALE = 1.1  # of a unit primer at the switches: its thrust has to burn somewhere
+_GRANTED = 1e-7  # of the exhaust velocity: 0.1 g of 1200 kg
+_SCOPE = "every time of flight, in continuous time"
 _CAUSES = ("maximum thrust", "propellant")
 GAP_TOLERANCE = 1e-6
 """Share of the start mass that a bound may lie below the best one: 1.2 g of 1200 kg."""
@@ -52,8 +54,8 @@ def prove_least_propellant(
         bound = _bound_at(problem, most, time)
         return Certificate(f"time of flight {time:g} s, in continuous time", (), (bound,), bound.propellant)
     aim = CoverAim(most, GAP_TOLERANCE * exhaust, -math.inf)
-    bound, scope = _bound(problem, most, *_cover(problem, most, time, flight, aim))
-    return Certificate(scope, (), (bound,), bound.propellant)
+    bound = _bound(problem, most, *_cover(problem, most, time, flight, aim))
+    return Certificate(_SCOPE, (), (bound,), bound.propellant)
 
 
 def prove_no_flight(problem: LandingProblem, time: float) -> Certificate | None:
@@ -65,13 +67,13 @@ def prove_no_flight(problem: LandingProblem, time: float) -> Certificate | None:
     """
     exhaust = problem.lander.exhaust_velocity
     most = exhaust * problem.log_mass_ratio
-    aim = CoverAim(most, GAP_TOLERANCE * exhaust, most)
-    times, cover = _cover(problem, most, time, None, aim)
-    if cover.level < most:
+    target = most + 2.0 * _GRANTED * exhaust
+    times, cover = _cover(problem, most, time, None, CoverAim(target, GAP_TOLERANCE * exhaust, target))
+    if cover.level < target:
         return None
-    bound, scope = _bound(problem, most, times, cover)
+    bound = _bound(problem, most, times, cover)
     causes = [name for name, without in _relaxed(problem) if prove_no_flight(without, time) is None]
-    return Certificate(f"{scope}: dual bound on the propellant", (*causes, *_CAUSES), (bound,))
+    return Certificate(f"{_SCOPE}: dual bound on the propellant", (*causes, *_CAUSES), (bound,))
 
 
 def _relaxed(problem: LandingProblem) -> list[tuple[str, LandingProblem]]:
@@ -96,11 +98,12 @@ def _cover(
 def _bound_at(problem: LandingProblem, most: float, time: float) -> DualBound:
     """What flights of one duration spend at least."""
     case, lowest = dual_case(problem, most), np.empty(_CELLS)
-    tolerance = 0.1 * GAP_TOLERANCE * problem.lander.exhaust_velocity
-    found = ascend(two_impulse_primer(time, case), time, case, tolerance, 2.0 * most)
+    aim = CoverAim(most, GAP_TOLERANCE * problem.lander.exhaust_velocity, -math.inf)
+    found = best_primer(two_impulse_primer(time, case), time, case, aim)
     times = np.linspace(0.0, time, _CELLS + 1)
     sweep_bound(found.primer, times, case, lowest)
-    return DualBound(problem, most, min(lowest[-1], most), (DualPiece(time, time, found.primer),), time, time)
+    pieces = (DualPiece(time, time, found.primer),)
+    return DualBound(problem, most, _claim(problem, lowest[-1], most), pieces, time, time)
 
 
 def _time_grid(case: DualCase, most: float, time: float) -> Array:
@@ -108,8 +111,8 @@ def _time_grid(case: DualCase, most: float, time: float) -> Array:
     pull = float(np.linalg.norm(case.gravity))
     longest = _LONGEST * time
     if pull > 0.0:
-        longest = (most + float(case.gravity @ (case.arrival - case.velocity)) / pull) / pull
-        longest = max(longest, time)
+        enough = (most + float(case.gravity @ (case.arrival - case.velocity)) / pull) / pull
+        longest = max(min(longest, enough), time)
     step, last = time / _CELLS, min(_UNIFORM * time, longest)
     around = time + step * np.concatenate([-_NEAR, _NEAR])
     times = np.concatenate([np.arange(0.0, last, step), around[around < last], [last]])
@@ -127,16 +130,18 @@ def _primer_of(flight: PrimerFlight) -> Array:
     return _FIRST_SCALE * np.concatenate([flight.primer[1] - slope * (flight.time - end), slope])
 
 
-def _bound(problem: LandingProblem, most: float, times: Array, cover: TimeCover) -> tuple[DualBound, str]:
-    """What a cover proves, and the times of flight that it speaks for, in words."""
+def _bound(problem: LandingProblem, most: float, times: Array, cover: TimeCover) -> DualBound:
+    """What a cover proves."""
     starts = np.flatnonzero(np.diff(cover.owner, prepend=-1))
     ends = np.append(times[starts[1:]], times[-1])
     pieces = [
         DualPiece(float(times[first]), float(end), cover.primers[cover.owner[first]])
         for first, end in zip(starts, ends, strict=True)
     ]
-    scope = f"every time of flight up to {times[-1]:.3g} s, in continuous time"
-    if problem.gravity.any():
-        pieces.append(DualPiece(float(times[-1]), math.inf, cover.primers[0]))
-        scope = "every time of flight, in continuous time"
-    return DualBound(problem, most, min(cover.level, most), tuple(pieces), longest=pieces[-1].end), scope
+    pieces.append(DualPiece(float(times[-1]), math.inf, cover.primers[0]))
+    return DualBound(problem, most, _claim(problem, cover.level, most), tuple(pieces))
+
+
+def _claim(problem: LandingProblem, level: float, most: float) -> float:
+    """[m/s] a level less what the checker's own grid may lose; no flight spends less than nothing."""
+    return max(min(level - _GRANTED * problem.lander.exhaust_velocity, most), 0.0)

@@ -1,8 +1,8 @@
 """A bound for every time of flight: a few affine primers that together cover all of them.
 
 Each primer bounds the velocity change of every duration, tightly near the one that it is best for. Where the
-best bound of those found so far is lowest, the best primer of that time joins them; so do the constant primer
-against gravity, |w - v_0 - g T| <= J, which alone covers all times beyond the last of the grid.
+best bound of those found so far is too low, the best primer of that time joins them. A constant primer, from
+|w - v_0 - g T| <= J, covers all times beyond the last of the grid.
 """
 
 from __future__ import annotations
@@ -16,12 +16,13 @@ from guidance.arrays import Array, Index
 from guidance.kernel import compile_kernel
 from guidance.lower_bound.dual_ascent import Ascent, ascend, dual_value, two_impulse_primer
 from guidance.lower_bound.dual_case import DualCase
-from guidance.lower_bound.dual_function import sweep_bound
+from guidance.lower_bound.dual_function import linear_part, sweep_bound
 
 _FIRST_STRIDE = 5e-3  # of the time of flight
 _NUDGE = 0.03  # towards the primer of two impulses: one that is best at another time may lie on a kink of D
+_FIRST_SCALE = 1.1  # of the primer of two impulses: longer than one, its thrust burns somewhere
 _STRETCH = 1.7  # of the distance from the best time
-MOST_PRIMERS = 40
+MOST_PRIMERS = 160
 """A cover that needs more is given up as it stands."""
 
 
@@ -43,9 +44,9 @@ class TimeCover(NamedTuple):
     """What a set of primers proves.
 
     Attributes:
-        primers: (a, b) each, shape (k, 6); b in 1/s.
+        primers: (a, b) each, shape (k, 6); b in 1/s. The first is constant, for all times beyond the grid.
         owner: index of the primer that bounds a cell of the grid of times, shape (n,).
-        level: [m/s] the least bound over all cells.
+        level: [m/s] the least bound over all cells and beyond.
         best_time: [s] a time of flight whose best bound is the least that was met.
         best_value: [m/s] that bound.
     """
@@ -58,29 +59,51 @@ class TimeCover(NamedTuple):
 
 
 @compile_kernel
-def constant_primer(case: DualCase) -> Array:
+def against_gravity(case: DualCase) -> Array:
     """Primer (a, b), shape (6,), of unit length against gravity; zero where there is no gravity."""
     primer = np.zeros(6)
-    size = math.sqrt(case.gravity @ case.gravity)
-    if size > 0.0:
-        primer[:3] = -case.gravity / size
+    primer[:3] = -case.gravity / max(math.sqrt(case.gravity @ case.gravity), 1e-300)
     return primer
 
 
 @compile_kernel
-def _best_primer(known: Array, time: float, case: DualCase, aim: CoverAim) -> Ascent:
-    """The best primer of a time, from one that is known or from that of two impulses."""
+def along_change(case: DualCase) -> Array:
+    """Primer (a, b), shape (6,), of unit length along the change of velocity; zero where there is none."""
+    primer = np.zeros(6)
+    change = case.arrival - case.velocity
+    primer[:3] = change / max(math.sqrt(change @ change), 1e-300)
+    return primer
+
+
+@compile_kernel
+def last_primer(case: DualCase, time: float) -> Array:
+    """The constant primer whose bound does not fall with the time of flight and is greatest at `time` [s]."""
+    first, second = against_gravity(case), along_change(case)
+    falls = second[:3] @ case.gravity > 0.0
+    if falls or linear_part(first, time, case) >= linear_part(second, time, case):
+        return first
+    return second
+
+
+@compile_kernel
+def best_primer(known: Array, time: float, case: DualCase, aim: CoverAim) -> Ascent:
+    """The best primer of a time, from one that is known or from that of two impulses.
+
+    Where no ascent gets that far it is that of two impulses, whose bound is their velocity change.
+    """
     gradient = np.empty(6)
-    second = two_impulse_primer(time, case)
+    impulses = two_impulse_primer(time, case)
+    second = _FIRST_SCALE * impulses
     first = known + _NUDGE * (second - known)
     if dual_value(second, time, case, gradient) > dual_value(first, time, case, gradient):
         first, second = second, first
     found = ascend(first, time, case, 0.1 * aim.tolerance, 2.0 * aim.target)
-    if found.stalled:
+    least = dual_value(impulses, time, case, gradient)
+    if found.stalled or found.value < least:
         other = ascend(second, time, case, 0.1 * aim.tolerance, 2.0 * aim.target)
         if other.value > found.value:
-            return other
-    return found
+            found = other
+    return found if found.value >= least else Ascent(impulses, least, True)
 
 
 @compile_kernel
@@ -116,6 +139,16 @@ def _nearest_open_cell(envelope: Array, times: Array, level: float, best_time: f
 
 
 @compile_kernel
+def _join(primer: Array, number: int, times: Array, case: DualCase, envelope: Array, owner: Index) -> None:
+    """Let a primer bound the cells that it bounds best."""
+    lowest = np.empty(envelope.size)
+    sweep_bound(primer, times, case, lowest)
+    for k in range(envelope.size):
+        if lowest[k] > envelope[k]:
+            envelope[k], owner[k] = lowest[k], number
+
+
+@compile_kernel
 def cover_times(times: Array, case: DualCase, start: Array, near: float, aim: CoverAim) -> TimeCover:
     """Find primers whose bounds lie above a level at every time of the grid.
 
@@ -131,23 +164,21 @@ def cover_times(times: Array, case: DualCase, start: Array, near: float, aim: Co
     """
     cells = times.size - 1
     primers, owner = np.empty((MOST_PRIMERS, 6)), np.zeros(cells, np.int64)
-    envelope, lowest = np.full(cells, -np.inf), np.empty(cells)
-    primers[0] = constant_primer(case)
-    sweep_bound(primers[0], times, case, envelope)
+    envelope = np.full(cells, -np.inf)
+    primers[0], primers[1] = last_primer(case, times[-1]), along_change(case)
+    for count in range(2):
+        _join(primers[count], count, times, case, envelope, owner)
     level, best_time, best_value = aim.target, near, np.inf
-    time, count, cell, again, stride = near, 1, -1, False, 0.0
+    time, count, cell, again, stride = near, 2, -1, False, 0.0
     known = start
     while count < MOST_PRIMERS:
-        found = _best_primer(known, time, case, aim)
+        found = best_primer(known, time, case, aim)
         better = found.value < best_value - aim.tolerance
         if found.value < best_value:
             best_value, best_time = found.value, time
             level = min(aim.target, best_value - aim.tolerance)
         primers[count] = found.primer
-        sweep_bound(found.primer, times, case, lowest)
-        for k in range(cells):
-            if lowest[k] > envelope[k]:
-                envelope[k], owner[k] = lowest[k], count
+        _join(found.primer, count, times, case, envelope, owner)
         count += 1
         if best_value < aim.floor:
             break
@@ -164,4 +195,5 @@ def cover_times(times: Array, case: DualCase, start: Array, near: float, aim: Co
         again = cell == cell_before
         time = _beyond(0.5 * (times[cell] + times[cell + 1]), best_time, again, times)
         known = primers[owner[cell]]
-    return TimeCover(primers[:count].copy(), owner, float(np.min(envelope)), best_time, best_value)
+    lowest_bound = min(float(np.min(envelope)), linear_part(primers[0], times[-1], case))
+    return TimeCover(primers[:count].copy(), owner, lowest_bound, best_time, best_value)

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from itertools import pairwise
 from typing import cast
 
 import numpy as np
@@ -14,7 +15,7 @@ from scipy.optimize import brentq
 
 import guidance
 from guidance import PAPER_LANDER, Lander, PlanStatus, State
-from guidance.descent.dual_bound import DualBound
+from guidance.descent.dual_bound import DualBound, DualPiece
 from guidance.descent.problem import LandingProblem
 from guidance.flight_time.primer_vector import find_primer_flight
 from guidance.lower_bound import prove_least_propellant, prove_no_flight
@@ -113,7 +114,7 @@ def test_the_tank_is_too_small_just_below_the_bound_and_never_above_a_flight():
         problem = paper_problem(rng)
         propellant, flight = least_propellant(problem)
         bound = prove_least_propellant(problem, propellant, flight.time, flight).lower_bound
-        for content, proved in ((bound - 5e-3, True), (propellant + 1e-6, False)):
+        for content, proved in ((bound - 2 * GAP, True), (propellant + 1e-6, False)):
             dry = replace(PAPER_LANDER, dry_mass=problem.state.mass - content)
             proof = prove_no_flight(replace(problem, lander=dry), flight.time)
             assert (proof is not None) == proved
@@ -136,9 +137,66 @@ def test_a_proof_is_verified_and_a_spoilt_one_is_not():
         "turned primer": replace(proof, pieces=(replace(first, primer=-first.primer), second, *rest)),
         "for ever": replace(proof, pieces=(replace(first, end=math.inf),)),
         "nothing": replace(proof, pieces=()),
+        "a time before the start": replace(
+            proof, shortest=-1.0, pieces=(replace(first, begin=-1.0), second, *rest)
+        ),
+        "no number": replace(proof, pieces=(replace(first, primer=first.primer * math.nan), second, *rest)),
+        "no number of a time": replace(proof, pieces=(replace(first, end=math.nan), second, *rest)),
+        "speaks of nothing": replace(proof, spent_at_most=0.0, bound=0.0),
+        "speaks of everything": replace(proof, spent_at_most=1e9),
     }
     for words, other in spoilt.items():
         assert not other.verified, words
+
+
+def test_a_long_horizon_hides_no_braking_burn():
+    """Twelve equal pieces and a far last time: integrated in few steps, the burn would be missed."""
+    problem = LandingProblem(State.parse([200, 100, 950, -8, -4, -30, 1200]), TARGET, PAPER_LANDER, GRAVITY)
+    time, claim = 23.5336, 85.0
+    primer = np.array([0.32059, 0.13901, 1.24420, *(np.array([-0.98937, -0.40955, -0.55850]) / time)])
+    marks = np.linspace(time, (claim - 30.0) / 1.62, 13)
+    pieces = [DualPiece(a, b, primer) for a, b in pairwise(marks)]
+    pieces.append(DualPiece(float(marks[-1]), 1e6, np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])))
+    assert not DualBound(problem, 90.0, 70.7, tuple(pieces), time, 1e6).verified
+
+
+def test_a_certificate_claims_no_more_than_its_proofs():
+    plan = guidance.solve_pdg(paper_start(np.random.default_rng(26)), TARGET)
+    assert plan.certificate is not None
+    assert plan.certificate.verified
+    assert not replace(plan.certificate, lower_bound=plan.certificate.lower_bound + 1e-3).verified
+    assert not replace(plan.certificate, lower_bound=math.inf).verified
+
+
+WEAK_GRAVITY = [200.0, 100.0, 950.0, -8.0, -4.0, -30.0, 1200.0]
+
+
+@pytest.mark.parametrize("gravity", [0.0, 1e-12, 1e-4, 1e-2])
+def test_with_next_to_no_gravity_the_change_of_velocity_is_the_bound(gravity):
+    """The slower the flight, the nearer to |v_0|: no time of flight is best."""
+    plan = guidance.solve_pdg(WEAK_GRAVITY, TARGET, gravity=(0, 0, -gravity))
+    assert plan.certificate is not None
+    assert plan.certificate.verified
+    least = 1200.0 * -math.expm1(-np.linalg.norm(WEAK_GRAVITY[3:6]) / PAPER_LANDER.exhaust_velocity)
+    assert 0.999 * least < plan.certificate.lower_bound
+    assert plan.optimality_gap < 0.15 * plan.propellant
+
+
+@pytest.mark.parametrize("sideways", [0.0, 4.4])
+def test_starts_that_move_up_are_bounded_as_well(sideways):
+    """Found by an adversary: cells next to a time of zero were left without a primer."""
+    start = [187.67863519952533, 51.14470468223607, 113.5501359130744, 4.354, sideways, 56.443, 1200.0]
+    plan = guidance.solve_pdg(start, [0, 0, 0], lander=Lander(dry_mass=545.99), gravity=(0, 0, -1.62))
+    assert plan.certificate is not None
+    assert plan.certificate.verified
+    assert plan.optimality_gap < 0.01 * plan.propellant
+
+
+def test_a_burn_that_outlasts_the_tank_of_any_vehicle_raises_nothing():
+    lander = Lander(dry_mass=600, specific_impulse=60)
+    plan = guidance.solve_pdg([0, 0, 1e5, 0, 0, -1, 1200], [0, 0, 0], gravity=(0, 0, 0), lander=lander)
+    assert plan.certificate is not None
+    assert 0.0 <= plan.certificate.lower_bound <= plan.propellant
 
 
 def test_every_plan_that_is_called_optimal_carries_its_proof():
