@@ -90,7 +90,7 @@ def _cover(
     problem: LandingProblem, most: float, time: float, flight: PrimerFlight | None, aim: CoverAim
 ) -> tuple[Array, TimeCover]:
     case = dual_case(problem, most)
-    times = _time_grid(case, most, time)
+    times = _time_grid(case, aim.target * (1.0 + 1e-12), time)
     start = two_impulse_primer(time, case) if flight is None else _primer_of(flight)
     return times, cover_times(times, case, start, time, aim)
 
@@ -106,12 +106,12 @@ def _bound_at(problem: LandingProblem, most: float, time: float) -> DualBound:
     return DualBound(problem, most, _claim(problem, lowest[-1], most), pieces, time, time)
 
 
-def _time_grid(case: DualCase, most: float, time: float) -> Array:
-    """[s] times of flight from 0 to the one beyond which gravity alone spends `most` [m/s]."""
+def _time_grid(case: DualCase, target: float, time: float) -> Array:
+    """[s] times of flight from 0 to the one beyond which gravity alone spends `target` [m/s]."""
     pull = float(np.linalg.norm(case.gravity))
     longest = _LONGEST * time
     if pull > 0.0:
-        enough = (most + float(case.gravity @ (case.arrival - case.velocity)) / pull) / pull
+        enough = (target + float(case.gravity @ (case.arrival - case.velocity)) / pull) / pull
         longest = max(min(longest, enough), time)
     step, last = time / _CELLS, min(_UNIFORM * time, longest)
     around = time + step * np.concatenate([-_NEAR, _NEAR])
@@ -120,7 +120,7 @@ def _time_grid(case: DualCase, most: float, time: float) -> Array:
         count = math.ceil(math.log(longest / last) / math.log(_STRETCH)) + 1
         times = np.concatenate([times, np.geomspace(last, longest, count)[1:]])
     times = np.sort(times)
-    return times[np.diff(times, prepend=-step) > 1e-6 * step]
+    return times[np.diff(times, append=math.inf) > 1e-6 * step]
 
 
 def _primer_of(flight: PrimerFlight) -> Array:
