@@ -63,14 +63,8 @@ def test_the_relaxation_gap_is_the_thrust_that_is_paid_for_and_not_given():
     rest = np.zeros((nodes, 3))
 
     def measured(thrust):
-        flight = Trajectory(
-            np.linspace(0.0, step * (nodes - 1), nodes),
-            rest.copy(),
-            rest.copy(),
-            mass.copy(),
-            thrust,
-            exhaust,
-        )
+        times = np.linspace(0.0, step * (nodes - 1), nodes)
+        flight = Trajectory(times, rest.copy(), rest.copy(), mass.copy(), thrust, exhaust)
         return fly_residuals(flight, problem).relaxation_gap
 
     assert measured(thrust.copy()) == pytest.approx(90.0, rel=1e-9)
