@@ -78,14 +78,11 @@ def _first_rise(beta: float, delta: float, epsilon: float) -> float:
     if third**3 > half * half:
         radius = 2.0 * math.sqrt(third)
         angle = math.acos(max(-1.0, min(1.0, -half / (third * math.sqrt(third))))) / 3.0
+        # angle is in [0, pi/3]: of the three this is the middle one, and the least is negative
         maximum = radius * math.cos(angle - 2.0 * math.pi / 3.0)
-        other = radius * math.cos(angle + 2.0 * math.pi / 3.0)
-        # cos(angle), angle in [0, pi/3], is the greatest; the other two are ordered here
-        middle = max(maximum, other)
-        if middle > 0.0 and _evaluate_quartic(middle, beta, delta, epsilon) >= 0.0:
-            start = max(0.0, min(maximum, other))
-            return _bracketed_root(start, middle, beta, delta, epsilon)
-        low = max(0.0, radius * math.cos(angle))
+        if maximum > 0.0 and _evaluate_quartic(maximum, beta, delta, epsilon) >= 0.0:
+            return _bracketed_root(0.0, maximum, beta, delta, epsilon)
+        low = radius * math.cos(angle)
     high = 1.0 + math.sqrt(beta) + abs(delta) ** (1.0 / 3.0) + epsilon**0.25
     return _bracketed_root(low, high, beta, delta, epsilon)
 

@@ -70,6 +70,21 @@ def test_optimum_at_the_ends_of_the_window():
     assert rising.time == pytest.approx(1.0)
 
 
+def test_it_goes_downhill_by_growing_steps_to_either_side():
+    _, falling = search(lambda t: Sample(t, -t, -1.0), 20.0)
+    _, rising = search(lambda t: Sample(t, t, 0.9), 20.0)
+    for run, side in ((falling, 1.0), (rising, -1.0)):
+        times = [side * sample.time for sample in run.samples]
+        assert times == sorted(times)
+        assert len(times) <= 10
+
+
+def test_where_the_slope_leaves_no_gain_it_asks_no_more():
+    best, run = search(lambda t: Sample(t, -1e-6 * t, -1e-6), 20.0)
+    assert best is not None
+    assert [sample.time for sample in run.samples] == [20.0]
+
+
 def test_no_feasible_time_ends_with_none_after_the_grid():
     best, run = search(lambda t: Sample(t, solved=False), 20.0)
     assert best is None

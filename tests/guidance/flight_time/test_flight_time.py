@@ -1,15 +1,17 @@
 """The search over the time of flight on costs with known optima, and the closed-form window."""
 
 import math
+from typing import cast
 
 import numpy as np
 import pytest
 from descents import FEASIBLE, GRAVITY, IMPOSSIBLE, TARGET, feasible_start, problem_of
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.optimize import brentq
 from timed_costs import Sample, hyperbola
 
-from guidance import PAPER_LANDER, State
+from guidance import PAPER_LANDER, Lander, State
 from guidance.descent.problem import LandingProblem
 from guidance.flight_time.search import TimeModel, TimeSearch
 from guidance.flight_time.time_window import TimeWindow, guess_time, time_window
@@ -121,3 +123,68 @@ def test_agrees_with_a_fine_scan():
     scan = [task.solve(time) for time in np.linspace(23.0, 32.0, 91)]
     best = min(s.value for s in scan if s.solved)
     assert found.value < best + 6e-6
+
+
+@pytest.mark.parametrize(("low", "high", "count"), [(10.0, 10.01, 4), (10.0, 20.0, 13), (1.0, 1000.0, 24)])
+def test_a_grid_goes_from_end_to_end_of_its_window_in_equal_ratios(low, high, count):
+    grid = TimeWindow(low, high).grid()
+    assert grid.size == count
+    assert grid[[0, -1]] == pytest.approx([low, high])
+    ratios = grid[1:] / grid[:-1]
+    assert ratios == pytest.approx(ratios[0])
+    assert ratios[0] <= 1.06 + 1e-12 or count == 24
+
+
+@pytest.mark.parametrize("climb", [-30.0, 0.0, 12.0])
+@pytest.mark.parametrize("sink", [0.0, 15.0])
+def test_the_guess_is_coast_and_brake_along_the_vertical(climb, sink):
+    """At constant mass: free fall to a speed s, then full thrust from s to the speed at the target."""
+    lift, height = 12000.0 / 1200.0 - 1.62, 900.0
+    problem = LandingProblem(
+        State.parse([0.0, 0.0, 50.0 + height, 0.0, 0.0, climb, 1200.0]),
+        TARGET,
+        PAPER_LANDER,
+        GRAVITY,
+        target_velocity=np.array([0.0, 0.0, -sink]),
+    )
+    time = guess_time(problem, TimeWindow(1.0, 1000.0))
+
+    def left_to_fall(seconds):
+        speed = sink + lift * seconds
+        return height + (climb**2 - speed**2) / 3.24 - sink * seconds - 0.5 * lift * seconds**2
+
+    braking = cast("float", brentq(left_to_fall, 0.0, 100.0))
+    assert time == pytest.approx((climb + sink + lift * braking) / 1.62 + braking, rel=1e-9)
+
+
+def test_a_target_velocity_beyond_free_fall_needs_no_brake():
+    problem = LandingProblem(
+        State.parse([0.0, 0.0, 950.0, 0.0, 0.0, -30.0, 1200.0]),
+        TARGET,
+        PAPER_LANDER,
+        GRAVITY,
+        target_velocity=np.array([0.0, 0.0, -100.0]),
+    )
+    fall = (math.sqrt(30.0**2 + 2.0 * 1.62 * 900.0) - 30.0) / 1.62
+    assert guess_time(problem, TimeWindow(1.0, 1000.0)) == pytest.approx(fall, rel=1e-9)
+
+
+def test_the_window_ends_where_the_propellant_for_hovering_ends():
+    """Thrown up at 60 m/s by an engine without limit, with 100 m/s on board: |v - g T| <= 100 m/s."""
+    lander = Lander(dry_mass=1200.0 * math.exp(-100.0 / 3187.16125), max_thrust=1e9)
+    problem = LandingProblem(State.parse([0.0, 0.0, 950.0, 0.0, 0.0, 60.0, 1200.0]), TARGET, lander, GRAVITY)
+    assert time_window(problem).high == pytest.approx((100.0 + 60.0) / 1.62, rel=1e-9)
+
+
+@given(
+    coefficients=st.tuples(st.floats(-5.0, 5.0), st.floats(0.5, 20.0), st.floats(20.0, 60.0)),
+    slopes=st.lists(st.floats(-3.0, 0.8), min_size=3, max_size=3, unique_by=lambda s: round(s, 2)),
+)
+def test_the_parabola_is_exact_where_the_time_is_quadratic_in_the_warped_slope(coefficients, slopes):
+    run = search(hyperbola())[1]
+
+    def time_at(slope):
+        return float(np.polyval(coefficients, TimeModel(1.0).warp(slope)))
+
+    samples = [Sample(time_at(slope), 0.0, slope) for slope in slopes]
+    assert run._parabola(samples) == pytest.approx(time_at(0.0), rel=1e-6)
