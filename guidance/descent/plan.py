@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property
@@ -47,8 +48,7 @@ class Plan:
         trajectory: the flight on N nodes (N - 1 intervals); empty where the status has none.
         landing_error: [m] distance from landing point to target; nan without a flight.
         message: the ending in words.
-        certificate: what is proved: why no flight exists, where the status is INFEASIBLE (or NEAREST, if
-            proved); what no flight undercuts, where it is OPTIMAL. None for plans of the closed loop.
+        proof: the `certificate`, or what makes it when it is first asked for.
         solves: conic (or nonlinear) programmes solved on the way, coarse ones and refinements included;
             those of proofs are not.
     """
@@ -59,7 +59,7 @@ class Plan:
     trajectory: Trajectory = field(default_factory=no_trajectory)
     landing_error: float = float("nan")
     message: str = ""
-    certificate: Certificate | None = None
+    proof: Certificate | Callable[[], Certificate] | None = None
     solves: int = 0
 
     @classmethod
@@ -114,6 +114,15 @@ class Plan:
     def propellant(self) -> float:
         """[kg] propellant that the plan burns; nan without a flight."""
         return float(self.mass[0] - self.mass[-1]) if self.mass.size else float("nan")
+
+    @cached_property
+    def certificate(self) -> Certificate | None:
+        """What is proved: why no flight exists, where INFEASIBLE; what no flight undercuts, where OPTIMAL.
+
+        The latter is made in about a millisecond on first use. None for plans to the nearest point and those
+        of the closed loop.
+        """
+        return self.proof() if callable(self.proof) else self.proof
 
     @property
     def optimality_gap(self) -> float:

@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -84,16 +85,20 @@ def answer(request: Request, unreachable: str) -> Plan:
 
 
 def _bounded(plan: Plan, this_time_alone: bool) -> Plan:
-    """The plan with the proof of what no flight undercuts; of its duration, where that was asked for."""
+    """The plan with a way to prove what no flight undercuts; of its duration, where that was asked for."""
     if plan.status is not PlanStatus.OPTIMAL or plan.propellant <= 0.0:
         return plan
+    trajectory = plan.trajectory
+    return replace(plan, proof=partial(_prove_bound, plan.problem, trajectory, this_time_alone))
+
+
+def _prove_bound(problem: LandingProblem, trajectory: Trajectory, this_time_alone: bool) -> Certificate:
     from guidance.flight_time.primer_vector import find_primer_flight
     from guidance.lower_bound.proof import prove_least_propellant
 
-    problem, time = plan.problem, plan.time_of_flight
+    propellant = float(trajectory.mass[0] - trajectory.mass[-1])
     flight = None if this_time_alone else find_primer_flight(problem)
-    proof = prove_least_propellant(problem, plan.propellant, time, flight, this_time_alone)
-    return replace(plan, certificate=proof)
+    return prove_least_propellant(problem, propellant, trajectory.duration, flight, this_time_alone)
 
 
 def _plan_again(request: Request, nodes: int, found: Plan) -> Plan:
@@ -237,4 +242,4 @@ def _proved(plan: Plan, proof: Certificate) -> Plan:
     limits = ", ".join(proof.causes)
     told = plan.message.startswith("propellant") or plan.message == limits
     message = plan.message if told else f"{plan.message} (limits: {limits})"
-    return replace(plan, status=PlanStatus.INFEASIBLE, certificate=proof, message=message)
+    return replace(plan, status=PlanStatus.INFEASIBLE, proof=proof, message=message)

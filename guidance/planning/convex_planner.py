@@ -74,7 +74,7 @@ def plan_convex(
     else:
         proof = prove_by_dual_bound(problem)
         if proof is not None:
-            none = Plan(PlanStatus.INFEASIBLE, problem, METHOD, message=_OUT_OF_REACH, certificate=proof)
+            none = Plan(PlanStatus.INFEASIBLE, problem, METHOD, message=_OUT_OF_REACH, proof=proof)
             return ConvexAnswer(none)
         tolerance = LOG_MASS_TOLERANCE if guess_time is None else _REPLAN_TOLERANCE
         outcome = minimise_over_time(task, tolerance, guess_time, coarse_first=guess_time is None)
