@@ -104,20 +104,40 @@ def test_what_is_left_of_a_plan_is_what_was_not_flown(periods: int, reference: T
     assert landed.time_to_go == rest.duration - landed.time[-1]
 
 
-@pytest.mark.parametrize("law", [0, 1])
+@pytest.mark.parametrize("law", [0, 1, 2, 3])
 def test_every_number_of_a_segment_is_written(
     law: int, reference: TrackingReference, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Fresh memory often holds zeros, which hide a number that nothing wrote."""
-    command = commands(reference)[law]
+    rest = reference.after(len(reference.thrust_acceleration) - 2)
+    assert rest is not None
+    command = [*commands(reference), ZemZevCommand(6.0, 2.0, 1.0), PlanCommand(rest, (0.0, 0.0))][law]
     state = State(SITE + np.array([0.0, 0.0, 12.0]), np.array([0.0, 0.0, -5.0]), 1190.0)
     plain = [fly(state, command, periods) for periods in (2, 10)]
     monkeypatch.setattr(vehicle.np, "empty", lambda shape: np.full(shape, np.nan))
     for periods, segment in zip((2, 10), plain, strict=True):
         again = fly(state, command, periods)
+        assert (np.diff(again.time) > 0.0).all()
         assert np.array_equal(again.time, segment.time)
         assert np.array_equal(again.path, segment.path)
         assert np.array_equal(again.commanded, segment.commanded)
+
+
+@pytest.mark.parametrize("degrees", [1.0, 4.0, 10.0])
+def test_a_plan_counts_each_period_in_which_the_pointing_limit_acted_once(
+    degrees: float, reference: TrackingReference
+) -> None:
+    """Without feedback the command points along the plan's own acceleration."""
+    lander = Lander(pointing_limit=math.radians(degrees))
+    late = reference.after(len(reference.thrust_acceleration) - 30)
+    assert late is not None
+    segment = fly(
+        State(late.position[0], late.velocity[0], 1180.0), PlanCommand(late, (0.0, 0.0)), 10, lander
+    )
+    east, north, up = late.thrust_acceleration[: len(segment.commanded)].T
+    acted = np.arctan2(np.hypot(east, north), up) > math.radians(degrees)
+    assert acted.any()
+    assert segment.pointing_limited == acted.sum()
 
 
 def test_what_a_flight_gives_cannot_be_changed() -> None:
