@@ -26,12 +26,15 @@ from studies.columns import Column
 Result = TypeVar("Result")
 
 _CALLS = 10  # of work that is too short for one
+_UPDATE_ROUNDS = 5
 _IMPORT = "import time; s = time.process_time(); import {module}; print(time.process_time() - s)"
 
 FREE_TO_FIXED_LIMIT = 2.0
 """Most that a free-time solve may cost, in fixed-time solves of the same nodes."""
 ENCODING_LIMIT = 7.0
 """Most that encoding a look may cost, in looks."""
+UPDATE_LIMIT = 0.93
+"""Most that an update of training may cost, in those of plain Stable-Baselines3; with bfloat16 it is less."""
 IMPORT_LIMIT = 0.5
 """Most that `import guidance` may cost, in imports of numpy, which it leaves to those who need it."""
 
@@ -88,7 +91,12 @@ def measure_ratios(preset: str = "paper", repeats: int = 15) -> list[SpeedRatio]
         ValueError: `repeats` is less than one, or the preset is unknown.
     """
     finite_number("repeats", repeats, at_least=1)
-    return [_compare_solves(preset, repeats), _compare_encoding(preset, repeats), _compare_imports(repeats)]
+    return [
+        _compare_solves(preset, repeats),
+        _compare_encoding(preset, repeats),
+        _compare_updates(),
+        _compare_imports(repeats),
+    ]
 
 
 def _compare_solves(preset: str, repeats: int) -> SpeedRatio:
@@ -116,6 +124,15 @@ def _compare_encoding(preset: str, repeats: int) -> SpeedRatio:
         looks.append(_least(look))
         encodings.append(_least(partial(encoder.encode, look().safety_map)))
     return SpeedRatio("encoding a look", "the look", _median(encodings), _median(looks), ENCODING_LIMIT)
+
+
+def _compare_updates() -> SpeedRatio:
+    from rl.training_speed import TrainingSpeed, measure_training_speed
+
+    speeds = measure_training_speed(TrainingSpeed(rounds=_UPDATE_ROUNDS))
+    ours = max(speeds["float32"], speeds["bfloat16 products"])  # the processor decides which is faster
+    theirs = speeds["stable-baselines3"]
+    return SpeedRatio("an update", "plain Stable-Baselines3's", 1.0 / ours, 1.0 / theirs, UPDATE_LIMIT)
 
 
 def _compare_imports(repeats: int) -> SpeedRatio:
