@@ -65,15 +65,20 @@ def prove_no_flight(problem: LandingProblem, time: float) -> Certificate | None:
         problem: the landing problem.
         time: [s] a likely time of flight, to begin with.
     """
+    bound = _bound_above_tank(problem, time)
+    if bound is None:
+        return None
+    causes = [name for name, without in _relaxed(problem) if _bound_above_tank(without, time) is None]
+    return Certificate(f"{_SCOPE}: dual bound on the propellant", (*causes, *_CAUSES), (bound,))
+
+
+def _bound_above_tank(problem: LandingProblem, time: float) -> DualBound | None:
+    """A bound that no tank pays for; None where there is none."""
     exhaust = problem.lander.exhaust_velocity
     most = exhaust * problem.log_mass_ratio
     target = most + 2.0 * _GRANTED * exhaust
     times, cover = _cover(problem, most, time, None, CoverAim(target, GAP_TOLERANCE * exhaust, target))
-    if cover.level < target:
-        return None
-    bound = _bound(problem, most, times, cover)
-    causes = [name for name, without in _relaxed(problem) if prove_no_flight(without, time) is None]
-    return Certificate(f"{_SCOPE}: dual bound on the propellant", (*causes, *_CAUSES), (bound,))
+    return _bound(problem, most, times, cover) if cover.level >= target else None
 
 
 def _relaxed(problem: LandingProblem) -> list[tuple[str, LandingProblem]]:
