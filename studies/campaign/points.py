@@ -10,12 +10,12 @@ from pathlib import Path
 
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+from hda.flight.episode_row import EpisodeRow
 from studies.campaign.episode_files import write_episodes
 from studies.campaign.executor import local_processes
 from studies.campaign.missing_chunks import find_missing, fly_missing
 from studies.campaign.monte_carlo import Study, join_chunks, prepare_study
 from studies.campaign.provenance import describe_study, write_provenance
-from studies.campaign.rows import EpisodeRow
 from studies.campaign.study_folder import Existing, StudyFolder, open_study_folder
 
 Rows = dict[str, tuple[EpisodeRow, ...]]

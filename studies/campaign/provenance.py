@@ -87,7 +87,7 @@ def digest_sources(paths: tuple[str, ...]) -> dict[str, str]:
     """Package -> digest of every file in it, weights included; also the module of a policy given by path."""
     root = Path(__file__).resolve().parents[1]
     digests = {name: _digest(root.parent / name) for name in ("guidance", "hda", "rl")}
-    digests["studies"] = _digest(root / "campaign" / "monte_carlo.py", root / "campaign" / "rows.py")
+    digests["studies"] = _digest(root / "campaign" / "monte_carlo.py")
     for path in paths:
         module = path.partition(":")[0]
         found = importlib.util.find_spec(module)

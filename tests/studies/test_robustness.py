@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from hda.flight.episode_row import EpisodeRow
 from hda.task.presets import PRESETS, Preset
 from studies.campaign.points import Rows
-from studies.campaign.rows import EpisodeRow
 from studies.campaign.study_folder import FolderError
 from studies.robustness.breaks import find_breaks
 from studies.robustness.command import Robustness, plan_points, run_robustness
