@@ -23,12 +23,14 @@ import numpy as np
 
 from guidance.arrays import Array
 from guidance.flight_time.extremal import Burn, Extremal, PrimerProblem, add_burn
+from guidance.flight_time.linear_system import solve_linear
 from guidance.kernel import compile_kernel
 
 _MOST_STEPS = 30
 _CONVERGED = 1e-10  # largest residual, non-dimensional: a micrometre on the paper's descents
 _LATEST_FIRST_BURN = 0.5  # of the time before the braking burn, in a first guess
 _UNIT = 1e-6  # by which the square of a unit vector may differ from one
+_STRIDE = 0.1  # of the time of flight: change from one extremal to the next
 _ANGLES = 4  # of the seven numbers of a step: two for each primer; three times follow
 
 
@@ -98,6 +100,11 @@ def _norm(values: Array) -> float:
 
 
 @compile_kernel
+def _length(values: Array) -> float:
+    return math.sqrt(values @ values)
+
+
+@compile_kernel
 def _admitted(x: Extremal, mass_flow: float) -> bool:
     """Whether the times are in order and mass is left."""
     first = max(x.times[0], 0.0)
@@ -105,47 +112,24 @@ def _admitted(x: Extremal, mass_flow: float) -> bool:
 
 
 @compile_kernel
-def solve_linear(matrix: Array, vector: Array) -> bool:
-    """Solve in place by elimination with row exchange; False where the matrix is singular."""
-    size = vector.size
-    for k in range(size):
-        best = k
-        for i in range(k + 1, size):
-            if abs(matrix[i, k]) > abs(matrix[best, k]):
-                best = i
-        if not abs(matrix[best, k]) > 1e-14:
-            return False
-        if best != k:
-            for j in range(k, size):
-                matrix[k, j], matrix[best, j] = matrix[best, j], matrix[k, j]
-            vector[k], vector[best] = vector[best], vector[k]
-        for i in range(k + 1, size):
-            factor = matrix[i, k] / matrix[k, k]
-            for j in range(k + 1, size):
-                matrix[i, j] -= factor * matrix[k, j]
-            vector[i] -= factor * vector[k]
-    for k in range(size - 1, -1, -1):
-        for j in range(k + 1, size):
-            vector[k] -= matrix[k, j] * vector[j]
-        vector[k] /= matrix[k, k]
-    return True
-
-
-@compile_kernel
 def _newton_step(
     x: Extremal, problem: PrimerProblem, here: Array, frame: Array, trial: Extremal
 ) -> tuple[Array, bool]:
-    """Full step towards a root, from a difference Jacobian, and whether there is one."""
-    jacobian, there = np.empty((7, 7)), np.empty(7)
+    """Full step towards a root, from a difference Jacobian, and whether there is one.
+
+    As many equations and unknowns as `here` has: with six the time of flight is held.
+    """
+    size = here.size
+    jacobian, there = np.empty((size, size)), np.empty(7)
     step = np.zeros(7)
     _set_frame(x, frame)
-    for k in range(7):
+    for k in range(size):
         step[k] = (
             -1e-7 if k == _ANGLES and x.times[0] < 0.0 else 1e-7
         )  # stay on one side of the kink at t1 = 0
         _move(x, frame, step, trial)
         _residuals(trial, problem, there)
-        for i in range(7):
+        for i in range(size):
             jacobian[i, k] = (there[i] - here[i]) / step[k]
         step[k] = 0.0
     full = -here
@@ -154,29 +138,29 @@ def _newton_step(
 
 
 @compile_kernel
-def _newton(x: Extremal, problem: PrimerProblem) -> bool:
-    """Damped Newton, in place; whether it converged."""
-    frame, step, trial = np.empty((4, 3)), np.empty(7), Extremal(np.empty((2, 3)), np.empty(3))
+def _newton(x: Extremal, problem: PrimerProblem, size: int) -> bool:
+    """Damped Newton, in place, on the first `size` unknowns and equations; whether it converged."""
+    frame, step, trial = np.empty((4, 3)), np.zeros(7), Extremal(np.empty((2, 3)), np.empty(3))
     here, there = np.empty(7), np.empty(7)
     if not _admitted(x, problem.mass_flow):
         return False
     _residuals(x, problem, here)
     for _ in range(_MOST_STEPS):
-        if _norm(here) < _CONVERGED:
+        if _norm(here[:size]) < _CONVERGED:
             return True
-        full, found = _newton_step(x, problem, here, frame, trial)
+        full, found = _newton_step(x, problem, here[:size], frame, trial)
         if not found:
             return False
         turn, delay = _norm(full[:_ANGLES]), _norm(full[_ANGLES + 1 :])
         damping = min(1.0, 0.7 / max(1e-9, turn), 0.5 / max(1e-9, delay))
-        before, better = math.sqrt(here @ here), False
+        before, better = _length(here[:size]), False
         for _ in range(12):
-            for number in range(7):
+            for number in range(size):
                 step[number] = damping * full[number]
             _move(x, frame, step, trial)
             if _admitted(trial, problem.mass_flow):
                 _residuals(trial, problem, there)
-                if math.sqrt(there @ there) < (1.0 - 0.1 * damping) * before:
+                if _length(there[:size]) < (1.0 - 0.1 * damping) * before:
                     better = True
                     break
             damping *= 0.5
@@ -184,7 +168,7 @@ def _newton(x: Extremal, problem: PrimerProblem) -> bool:
             return False
         _copy(trial, x)
         here, there = there, here
-    return _norm(here) < _CONVERGED
+    return _norm(here[:size]) < _CONVERGED
 
 
 @compile_kernel
@@ -232,6 +216,19 @@ def _guess(problem: PrimerProblem, first_burn: bool, x: Extremal) -> bool:
 
 
 @compile_kernel
+def _solve_from(x: Extremal, problem: PrimerProblem, size: int) -> bool:
+    """Newton from a guess, with the time of flight of the guess as unit of time."""
+    r, v, g, flow = problem
+    unit = x.times[2]
+    for k in range(3):
+        x.times[k] /= unit
+    found = _newton(x, PrimerProblem(r / (unit * unit), v / unit, g, flow * unit), size)
+    for k in range(3):
+        x.times[k] *= unit
+    return found
+
+
+@compile_kernel
 def solve_primer(problem: PrimerProblem, x: Extremal) -> bool:
     """Find the extremal of a problem.
 
@@ -242,17 +239,35 @@ def solve_primer(problem: PrimerProblem, x: Extremal) -> bool:
     Returns:
         Whether there was a first guess, and Newton's method converged from it.
     """
-    r, v, g, flow = problem
-    if not 1e-6 < g @ g < 0.98 or not r @ g < 0.0:
+    g = problem.gravity
+    if not 1e-6 < g @ g < 0.98 or not problem.position @ g < 0.0:
         return False
     for attempt in range(2):
         if not _guess(problem, attempt == 0, x):
             continue
-        unit = x.times[2]
-        for k in range(3):
-            x.times[k] /= unit
-        if _newton(x, PrimerProblem(r / (unit * unit), v / unit, g, flow * unit)):
-            for k in range(3):
-                x.times[k] *= unit
+        if _solve_from(x, problem, 7):
             return True
     return False
+
+
+@compile_kernel
+def solve_primer_at(time: float, problem: PrimerProblem, x: Extremal) -> bool:
+    """Find the extremal of one time of flight from that of another, in steps.
+
+    Its time is held, so that the Hamiltonian need not vanish: six equations for q1, q2, t1 and t2.
+
+    Args:
+        time: [s] of flight.
+        problem: in seconds, as `PrimerProblem` says.
+        x: an extremal of the problem in seconds; the answer. Where there is none it is spoilt.
+    """
+    start = x.times[2]
+    steps = 1 + int(abs(time - start) / (_STRIDE * start))
+    for k in range(steps):
+        later = start + (time - start) * (k + 1) / steps
+        change = later - x.times[2]
+        x.times[1] += change * x.times[1] / x.times[2]
+        x.times[2] = later
+        if not _solve_from(x, problem, 6):
+            return False
+    return True

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from guidance.arrays import Array
-from guidance.flight_time.primer_equations import solve_linear
+from guidance.flight_time.linear_system import solve_linear
 from guidance.kernel import compile_kernel
 from guidance.lower_bound.dual_case import DualCase
 from guidance.lower_bound.dual_function import linear_part, split_step, step_growth, support
