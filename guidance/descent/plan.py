@@ -45,7 +45,7 @@ class Plan:
         status: how planning ended.
         problem: what was asked.
         method: which solver planned.
-        trajectory: the flight on N nodes (N - 1 intervals); empty where the status has none.
+        trajectory: the flight on N nodes; empty where the status has none.
         landing_error: [m] distance from landing point to target; nan without a flight.
         message: the ending in words.
         proof: the `certificate`, or what makes it when it is first asked for.
@@ -149,6 +149,21 @@ class Plan:
         """
         self._demand_flight("has no thrust")
         return self.trajectory.thrust_at(time)
+
+    def states_at(self, time: ArrayLike) -> tuple[Array, Array]:
+        """Planned position and velocity, exact for the planned thrust.
+
+        Args:
+            time: [s] shape (k,), from 0 to the plan's end.
+
+        Returns:
+            Position [m] and velocity [m/s], shape (k, 3) each.
+
+        Raises:
+            ValueError: the plan holds no flight.
+        """
+        self._demand_flight("has no states")
+        return self.trajectory.states_at(np.asarray(time, dtype=np.float64), self.problem.gravity)
 
     @cached_property
     def residuals(self) -> Residuals:

@@ -77,7 +77,7 @@ class PrimerPath(NamedTuple):
 
 
 @compile_kernel
-def _primer_at(x: Extremal, time: float, p: Array) -> None:
+def primer_at(x: Extremal, time: float, p: Array) -> None:
     """Primer vector at a time."""
     fraction = (time - x.times[0]) / (x.times[1] - x.times[0])
     for axis in range(3):
@@ -91,7 +91,7 @@ def add_burn(x: Extremal, burn: Burn, mass_flow: float, then: float, out: Array)
     p = np.empty(3)
     for k in range(_POINTS.size):
         elapsed = half * (1.0 + _POINTS[k])
-        _primer_at(x, burn.begin + elapsed, p)
+        primer_at(x, burn.begin + elapsed, p)
         size = math.sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2])
         impulse = half * _WEIGHTS[k] / ((burn.mass - mass_flow * elapsed) * max(size, 1e-12))
         for axis in range(3):
@@ -112,7 +112,7 @@ def fly_extremal(x: Extremal, problem: PrimerProblem) -> PrimerPath:
     for axis in range(3):
         state[axis], state[3 + axis] = problem.position[axis], problem.velocity[axis]
     for k in range(points):
-        _primer_at(x, time, p)
+        primer_at(x, time, p)
         size = max(math.sqrt(p @ p), 1e-12)
         for axis in range(3):
             path.position[k, axis], path.velocity[k, axis] = state[axis], state[3 + axis]

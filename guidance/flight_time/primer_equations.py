@@ -30,6 +30,7 @@ _MOST_STEPS = 30
 _CONVERGED = 1e-10  # largest residual, non-dimensional: a micrometre on the paper's descents
 _LATEST_FIRST_BURN = 0.5  # of the time before the braking burn, in a first guess
 _UNIT = 1e-6  # by which the square of a unit vector may differ from one
+_FARTHEST = 3.0  # ratio of times of flight
 _STRIDE = 0.1  # of the time of flight: change from one extremal to the next
 _ANGLES = 4  # of the seven numbers of a step: two for each primer; three times follow
 
@@ -262,6 +263,8 @@ def solve_primer_at(time: float, problem: PrimerProblem, x: Extremal) -> bool:
         x: an extremal of the problem in seconds; the answer. Where there is none it is spoilt.
     """
     start = x.times[2]
+    if not start / _FARTHEST < time < start * _FARTHEST:
+        return False
     steps = 1 + int(abs(time - start) / (_STRIDE * start))
     for k in range(steps):
         later = start + (time - start) * (k + 1) / steps

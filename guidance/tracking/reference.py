@@ -17,7 +17,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from guidance.arrays import Array
-from guidance.descent.plan import Plan
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,27 +60,6 @@ class TrackingReference:
             self.velocity[periods:].copy(),
             self.thrust_acceleration[periods:].copy(),
         )
-
-
-def states_at(plan: Plan, times: Array) -> tuple[Array, Array]:
-    """Position and velocity of a plan at given times, exact for its first-order hold.
-
-    Args:
-        plan: with a flight.
-        times: [s] shape (k,), from 0 to the plan's end.
-
-    Returns:
-        Position [m] and velocity [m/s], shape (k, 3) each.
-    """
-    step = plan.time[1]
-    k = np.clip((times / step).astype(np.int64), 0, plan.nodes - 2)
-    s = (times - k * step)[:, None]
-    thrust = plan.thrust / plan.mass[:, None]
-    now = thrust[k] + plan.problem.gravity
-    rise = (thrust[k + 1] - thrust[k]) / step
-    position = plan.position[k] + plan.velocity[k] * s + now * s**2 / 2.0 + rise * s**3 / 6.0
-    velocity = plan.velocity[k] + now * s + rise * s**2 / 2.0
-    return position, velocity
 
 
 def make_reference(

@@ -18,7 +18,7 @@ from guidance.reference.nonlinear_program import NonlinearSolver, fatrop_present
 from hda.task.scenario import sample_scenario
 from studies.timing.gfold_peer import PEER_METHOD, gfold_present, plan_gfold
 
-CONVEX, CASADI, CVXPY = METHODS
+AUTO, _, CONVEX, CASADI, CVXPY = METHODS
 
 PEER_NODES = 30
 _TIGHT_NODES = 201
@@ -62,7 +62,7 @@ class Case:
 
 
 def ask(
-    problem: LandingProblem, nodes: int, time_of_flight: float | None, method: PlanningMethod = CONVEX
+    problem: LandingProblem, nodes: int, time_of_flight: float | None, method: PlanningMethod = AUTO
 ) -> Plan:
     """Call `solve_pdg` on a problem; a plan without a flight is returned, not raised."""
     try:

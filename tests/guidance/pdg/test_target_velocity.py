@@ -17,7 +17,7 @@ from guidance.pdg.solve import METHODS
 from guidance.planning.convex_task import ConvexTask
 from guidance.planning.deferred_decision import plan_deferred
 from guidance.planning.reachability import reachable_set
-from guidance.tracking.reference import make_reference, states_at
+from guidance.tracking.reference import make_reference
 from guidance.tracking.retarget import shift_landing_point
 
 START = [180.0, 120.0, 940.0, -7.0, -4.0, -28.0, 1200.0]
@@ -210,7 +210,7 @@ def test_sites_within_reach_are_reached_with_the_velocity():
 def test_a_plan_with_a_velocity_is_sampled_and_shifted_as_others_are():
     plan = guidance.solve_pdg(START, TARGET, target_velocity=VELOCITY)
     times = np.linspace(0.0, plan.time_of_flight, 40)
-    reference = make_reference(*states_at(plan, times), times[1], GRAVITY)
+    reference = make_reference(*plan.states_at(times), times[1], GRAVITY)
     moved = shift_landing_point(reference, TARGET + np.array([6.0, -2.0, 0.0]), GRAVITY)
     for path, site in ((reference, TARGET), (moved, TARGET + np.array([6.0, -2.0, 0.0]))):
         np.testing.assert_allclose(path.position[-1], site, atol=1e-3)

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from guidance.pdg.solve import solve_pdg
-from guidance.tracking.reference import TrackingReference, make_reference, states_at
+from guidance.tracking.reference import TrackingReference, make_reference
 from guidance.tracking.regulator import TrackingWeights, tracking_gains
 
 GRAVITY = np.array([0.0, 0.0, -1.62])
@@ -19,7 +19,7 @@ def plan():
 
 def test_held_feedforward_keeps_the_velocity_of_the_reference(plan) -> None:
     times = np.linspace(0.0, plan.time_of_flight, 40)
-    position, velocity = states_at(plan, times)
+    position, velocity = plan.states_at(times)
     reference = make_reference(position, velocity, times[1], GRAVITY)
     flown = velocity[0] + np.cumsum((reference.thrust_acceleration + GRAVITY) * times[1], axis=0)
     np.testing.assert_allclose(flown, velocity[1:], atol=1e-10)
@@ -37,13 +37,13 @@ def test_states_between_nodes_match_a_fine_integration(plan) -> None:
         [np.zeros(3), np.cumsum(0.5 * (velocity[1:] + velocity[:-1]) * step, axis=0)]
     )
     at = np.array([0, 777, 50_001, 123_456, 200_000])
-    got_position, got_velocity = states_at(plan, times[at])
+    got_position, got_velocity = plan.states_at(times[at])
     np.testing.assert_allclose(got_velocity, velocity[at], atol=2e-4)
     np.testing.assert_allclose(got_position, position[at], atol=5e-3)
 
 
 def test_states_at_nodes_are_the_nodes(plan) -> None:
-    position, velocity = states_at(plan, plan.time)
+    position, velocity = plan.states_at(plan.time)
     np.testing.assert_allclose(position, plan.position, atol=1e-4)
     np.testing.assert_allclose(velocity, plan.velocity, atol=1e-4)
 
