@@ -30,8 +30,6 @@ _MOST_STEPS = 30
 _CONVERGED = 1e-10  # largest residual, non-dimensional: a micrometre on the paper's descents
 _LATEST_FIRST_BURN = 0.5  # of the time before the braking burn, in a first guess
 _UNIT = 1e-6  # by which the square of a unit vector may differ from one
-_FARTHEST = 3.0  # ratio of times of flight
-_STRIDE = 0.1  # of the time of flight: change from one extremal to the next
 _ANGLES = 4  # of the seven numbers of a step: two for each primer; three times follow
 
 
@@ -74,7 +72,8 @@ def _move(x: Extremal, frame: Array, step: Array, out: Extremal) -> None:
 
 
 @compile_kernel
-def _copy(x: Extremal, out: Extremal) -> None:
+def copy_extremal(x: Extremal, out: Extremal) -> None:
+    """Write an extremal into another."""
     for axis in range(3):
         out.primer[0, axis], out.primer[1, axis] = x.primer[0, axis], x.primer[1, axis]
         out.times[axis] = x.times[axis]
@@ -167,7 +166,7 @@ def _newton(x: Extremal, problem: PrimerProblem, size: int) -> bool:
             damping *= 0.5
         if not better:
             return False
-        _copy(trial, x)
+        copy_extremal(trial, x)
         here, there = there, here
     return _norm(here[:size]) < _CONVERGED
 
@@ -217,8 +216,14 @@ def _guess(problem: PrimerProblem, first_burn: bool, x: Extremal) -> bool:
 
 
 @compile_kernel
-def _solve_from(x: Extremal, problem: PrimerProblem, size: int) -> bool:
-    """Newton from a guess, with the time of flight of the guess as unit of time."""
+def solve_from(x: Extremal, problem: PrimerProblem, size: int) -> bool:
+    """Newton from a guess, with the time of flight of the guess as unit of time.
+
+    Args:
+        x: a guess in seconds; the answer.
+        problem: in seconds.
+        size: 7; or 6 to hold the time of flight, where the Hamiltonian need not vanish.
+    """
     r, v, g, flow = problem
     unit = x.times[2]
     for k in range(3):
@@ -246,31 +251,6 @@ def solve_primer(problem: PrimerProblem, x: Extremal) -> bool:
     for attempt in range(2):
         if not _guess(problem, attempt == 0, x):
             continue
-        if _solve_from(x, problem, 7):
+        if solve_from(x, problem, 7):
             return True
     return False
-
-
-@compile_kernel
-def solve_primer_at(time: float, problem: PrimerProblem, x: Extremal) -> bool:
-    """Find the extremal of one time of flight from that of another, in steps.
-
-    Its time is held, so that the Hamiltonian need not vanish: six equations for q1, q2, t1 and t2.
-
-    Args:
-        time: [s] of flight.
-        problem: in seconds, as `PrimerProblem` says.
-        x: an extremal of the problem in seconds; the answer. Where there is none it is spoilt.
-    """
-    start = x.times[2]
-    if not start / _FARTHEST < time < start * _FARTHEST:
-        return False
-    steps = 1 + int(abs(time - start) / (_STRIDE * start))
-    for k in range(steps):
-        later = start + (time - start) * (k + 1) / steps
-        change = later - x.times[2]
-        x.times[1] += change * x.times[1] / x.times[2]
-        x.times[2] = later
-        if not _solve_from(x, problem, 6):
-            return False
-    return True

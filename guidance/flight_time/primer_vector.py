@@ -13,7 +13,8 @@ import numpy as np
 from guidance.arrays import Array
 from guidance.descent.problem import LandingProblem
 from guidance.flight_time.extremal import LEGS, Extremal, PrimerPath, PrimerProblem, fly_extremal
-from guidance.flight_time.primer_equations import solve_primer, solve_primer_at
+from guidance.flight_time.fixed_time import solve_primer_at
+from guidance.flight_time.primer_equations import solve_primer
 
 
 @dataclass(frozen=True, eq=False)

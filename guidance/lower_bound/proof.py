@@ -21,6 +21,7 @@ _CELLS = 240  # of the grid of times, up to the time to begin with; as wide up t
 _UNIFORM = 2.5
 _NEAR = np.array([0.02, 0.05, 0.1, 0.2, 0.35, 0.6])  # of a cell: there the least propellant may have a kink
 _STRETCH = 1.03  # ratio of times beyond
+_HAIR = 1e-9  # of one time of flight: the cell whose bound is that of this time
 _LONGEST = 1e4  # times the first: the last one of the grid where gravity is too weak to end it
 _FIRST_SCALE = 1.1  # of a unit primer at the switches: its thrust has to burn somewhere
 _GRANTED = 1e-7  # of the exhaust velocity: 0.1 g of 1200 kg
@@ -102,10 +103,11 @@ def _cover(
 
 def _bound_at(problem: LandingProblem, most: float, time: float) -> DualBound:
     """What flights of one duration spend at least."""
-    case, lowest = dual_case(problem, most), np.empty(_CELLS)
+    case = dual_case(problem, most)
     aim = CoverAim(most, GAP_TOLERANCE * problem.lander.exhaust_velocity, -math.inf)
     found = best_primer(two_impulse_primer(time, case), time, case, aim)
-    times = np.linspace(0.0, time, _CELLS + 1)
+    times = np.append(np.linspace(0.0, time, _CELLS + 1)[:-1], [time * (1.0 - _HAIR), time])
+    lowest = np.empty(times.size - 1)
     sweep_bound(found.primer, times, case, lowest)
     pieces = (DualPiece(time, time, found.primer),)
     return DualBound(problem, most, _claim(problem, lowest[-1], most), pieces, time, time)

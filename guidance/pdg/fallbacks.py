@@ -93,6 +93,8 @@ def answer(request: Request, unreachable: str) -> Plan:
         unreachable: 'raise', or 'nearest' to fly to the reachable point nearest to the target.
     """
     plan = plan_by_method(request)
+    if request.provisional and unreachable == "raise":
+        return plan
     if plan.status is not PlanStatus.OPTIMAL:
         plan = answer_without_flight(plan, request, unreachable)
     if request.provisional:

@@ -102,7 +102,8 @@ def replan(
     """A plan for the closed loop, which replaces it before it is flown to its end; a failure is a status.
 
     It is taken as the planner finds it: not flown first, so that it may miss a limit between nodes, and near
-    the best time of flight rather than at it. `solve_pdg` gives plans that are flown as they are.
+    the best time of flight rather than at it; and where there is none, why is not proved for 'raise'.
+    `solve_pdg` gives plans that are flown as they are.
 
     Args:
         problem: what to solve.

@@ -74,4 +74,19 @@ def make_reference(
         gravity: [m/s^2] shape (3,).
     """
     feedforward = np.diff(velocity, axis=0) / control_period - gravity
-    return TrackingReference(control_period, position, velocity, feedforward)
+    held = _fly_held(position[0], velocity[0], feedforward + gravity, control_period)
+    left = control_period * (np.arange(len(feedforward), 0.0, -1.0) - 0.5)
+    lever = (left - left.mean())[:, None]
+    missing = position[-1] - held[0][-1]
+    feedforward = feedforward + lever * missing / max(control_period * float((lever**2).sum()), 1e-12)
+    flown = _fly_held(position[0], velocity[0], feedforward + gravity, control_period)
+    return TrackingReference(control_period, *flown, feedforward)
+
+
+def _fly_held(
+    position: Array, velocity: Array, acceleration: Array, control_period: float
+) -> tuple[Array, Array]:
+    """States at the control instants under accelerations that are held between them."""
+    speed = np.vstack([velocity, velocity + control_period * np.cumsum(acceleration, axis=0)])
+    steps = 0.5 * control_period * (speed[1:] + speed[:-1])
+    return np.vstack([position, position + np.cumsum(steps, axis=0)]), speed

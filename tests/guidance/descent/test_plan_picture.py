@@ -113,5 +113,5 @@ def test_the_title_says_what_the_flight_costs() -> None:
     plan = solve()
     figure = draw_plan(plan)
     assert figure.get_suptitle() == (
-        f"optimal, convex: {plan.time_of_flight:.2f} s, {plan.propellant:.2f} kg burnt, 0.0 m from the target"
+        f"optimal, indirect: {plan.time_of_flight:.2f} s, {plan.propellant:.2f} kg burnt, 0.0 m from the target"
     )

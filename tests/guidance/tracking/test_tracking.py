@@ -14,7 +14,9 @@ GRAVITY = np.array([0.0, 0.0, -1.62])
 
 @pytest.fixture(scope="module")
 def plan():
-    return solve_pdg((200.0, 100.0, 950.0, -8.0, -4.0, -30.0, 1200.0), (0.0, 0.0, 50.0), nodes=21)
+    return solve_pdg(
+        (200.0, 100.0, 950.0, -8.0, -4.0, -30.0, 1200.0), (0.0, 0.0, 50.0), nodes=21, method="convex"
+    )
 
 
 def test_held_feedforward_keeps_the_velocity_of_the_reference(plan) -> None:
