@@ -8,28 +8,37 @@ other jobs on the machine disturb, are written beside it.
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
+from hashlib import sha256
+from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 import tyro
 from rich.console import Console
 
 from guidance.console import tolerate_encoding
 from guidance.validation import finite_number
-from studies.campaign.command_line import one_line_errors, open_folder
-from studies.campaign.provenance import describe_run, write_provenance
+from studies.campaign.command_line import open_folder, resumable
+from studies.campaign.journal import open_journal
+from studies.campaign.provenance import describe_run, identify_run, write_provenance
+from studies.campaign.run_options import FolderOptions
 from studies.columns import console_table, write_csv, write_markdown
 from studies.timing.conclusions import conclude
-from studies.timing.gfold_peer import gfold_present
-from studies.timing.measures import Summary, measure_calls, summarize_calls
-from studies.timing.methods import paper_cases, reference_cases, timed_methods
+from studies.timing.gfold_peer import PEER_METHOD, gfold_present
+from studies.timing.measures import Call, Summary, measure_calls, name_processor, summarize_calls
+from studies.timing.methods import Case, paper_cases, reference_cases, timed_methods
 from studies.timing.table import CALL_COLUMNS, SUMMARY_COLUMNS
 
-_CASES = Path(__file__).parent / "cases" / "pdg_cases.json"
+_WING = Path(__file__).parent
+_CASES = _WING / "cases" / "pdg_cases.json"
+_PRODUCTS = ("timing.csv", "timing.md", "calls.csv", "provenance.json", "conclusions.txt", "timing.png")
 
 
-@dataclass(frozen=True)
-class Timing:
+@dataclass(frozen=True, kw_only=True)
+class Timing(FolderOptions):
     """Command line of the timing study.
 
     Attributes:
@@ -37,7 +46,6 @@ class Timing:
         preset: the setting they are drawn from.
         cases: JSON file of reference cases.
         repeats: calls per case and method; all of them count.
-        out: folder for results; results/timing by default.
         figures: draw the figure.
     """
 
@@ -45,8 +53,8 @@ class Timing:
     preset: str = "paper"
     cases: Path = _CASES
     repeats: int = 1
-    out: Path = Path("results/timing")
     figures: bool = True
+    out: Path = Path("results/timing")
 
     def __post_init__(self) -> None:
         """Check every option."""
@@ -54,30 +62,58 @@ class Timing:
         finite_number("repeats", self.repeats, at_least=1)
 
 
+def identify_timing(options: Timing) -> dict[str, Any]:
+    """All that decides what a call is: how many are made does not.
+
+    Raises:
+        OSError: the cases cannot be read.
+    """
+    decided = {
+        "preset": options.preset,
+        "cases": sha256(options.cases.read_bytes()).hexdigest()[:16],
+        "peers": {PEER_METHOD: version(PEER_METHOD) if gfold_present() else None},
+        "processor": name_processor(),
+    }
+    return identify_run(_WING, decided)
+
+
+def list_cases(options: Timing) -> list[Case]:
+    """Reference cases and drawn starts.
+
+    Raises:
+        ValueError: an option names something unknown, or two cases have the same name.
+        OSError: the cases cannot be read.
+    """
+    cases = reference_cases(options.cases) + paper_cases(options.starts, options.preset)
+    for name, count in Counter(case.name for case in cases).items():
+        if count > 1:
+            raise ValueError(f"cases: {count} of them have the name {name!r}")
+    return cases
+
+
 def study_timing(options: Timing) -> list[Summary]:
     """Measure, write tables, every call, conclusions.txt, provenance.json and the figure, and print.
 
     Raises:
-        ValueError: an option is out of range or names something unknown.
+        ValueError: an option is out of range or names something unknown, or the folder holds another study.
         OSError: the cases cannot be read or the folder cannot be written.
     """
     out, console = open_folder(options.out), Console()
     methods = timed_methods()
     if not gfold_present():
         console.print("gfold is not installed: the study runs without it (extra `peers`)", style="yellow")
-    cases = reference_cases(options.cases) + paper_cases(options.starts, options.preset)
-    calls = measure_calls(methods, cases, options.repeats)
-    summaries = [summarize_calls(method.label, calls) for method in methods]
-    words = conclude(methods, calls, summaries)
-    write_csv(out / "timing.csv", SUMMARY_COLUMNS, summaries)
-    write_markdown(out / "timing.md", SUMMARY_COLUMNS, summaries)
-    write_csv(out / "calls.csv", CALL_COLUMNS, calls)
-    write_provenance(out / "provenance.json", describe_run(options))
-    (out / "conclusions.txt").write_text("\n".join(words) + "\n")
-    if options.figures:
-        from studies.timing.picture import draw_timing
+    identity = identify_timing(options)
+    with open_journal(out, Call, _PRODUCTS, identity, options.existing) as journal:
+        cases = list_cases(options)
+        calls = measure_calls(methods, cases, options.repeats, journal)
+        summaries = [summarize_calls(method.label, calls) for method in methods]
+        words = conclude(methods, calls, summaries)
+        write_timing(out, calls, summaries, words)
+        if options.figures:
+            from studies.timing.picture import draw_timing
 
-        draw_timing(methods, calls).savefig(out / "timing.png", dpi=110)
+            draw_timing(methods, calls).savefig(out / "timing.png", dpi=110)
+        write_provenance(out / "provenance.json", {**describe_run(options), "work": journal.describe()})
     feasible = sum(case.feasible for case in cases)
     title = f"{feasible} feasible and {len(cases) - feasible} infeasible cases"
     Console(width=max(Console().width, 150)).print(console_table(SUMMARY_COLUMNS, summaries, title))
@@ -87,8 +123,18 @@ def study_timing(options: Timing) -> list[Summary]:
     return summaries
 
 
+def write_timing(
+    out: Path, calls: Sequence[Call], summaries: Sequence[Summary], words: Sequence[str]
+) -> None:
+    """Write the tables, every call and the conclusions."""
+    write_csv(out / "timing.csv", SUMMARY_COLUMNS, summaries)
+    write_markdown(out / "timing.md", SUMMARY_COLUMNS, summaries)
+    write_csv(out / "calls.csv", CALL_COLUMNS, calls)
+    (out / "conclusions.txt").write_text("\n".join(words) + "\n")
+
+
 def main() -> None:
     """Command line; a wrong option is one line on stderr and exit code 2."""
     tolerate_encoding()
-    with one_line_errors():
+    with resumable():
         study_timing(tyro.cli(Timing, description=__doc__))

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import platform
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
 from time import perf_counter, process_time
 
 import numpy as np
 from rich.progress import track
 
 from guidance import PlanStatus
+from studies.campaign.journal import Journal
 from studies.timing.methods import Case, Method
 
 
@@ -104,17 +108,37 @@ def measure_call(method: Method, case: Case) -> Call:
     )
 
 
-def measure_calls(methods: Sequence[Method], cases: Sequence[Case], repeats: int) -> list[Call]:
-    """Every method on every case in turn; a call that compiles for a new set of limits is not counted."""
+def measure_calls(
+    methods: Sequence[Method], cases: Sequence[Case], repeats: int, journal: Journal[Call]
+) -> list[Call]:
+    """Every method on every case in turn; a call that compiles for a new set of limits is not counted.
+
+    Calls that stand in the journal are not made again, and each goes there at once.
+    """
     calls: list[Call] = []
     warm: set[tuple[bool, ...]] = set()
     for case in track(cases, "cases", transient=True):
-        if case.limits not in warm:
+        turns = [(turn, method) for turn in range(repeats) for method in methods]
+        kept = [journal.find((case.name, method.label, turn)) for turn, method in turns]
+        if None in kept and case.limits not in warm:
             warm.add(case.limits)
             for method in methods:
                 method.run(case)
-        calls += [measure_call(method, case) for _ in range(repeats) for method in methods]
+        calls += [
+            journal.finish((case.name, method.label, turn), partial(measure_call, method, case))
+            for turn, method in turns
+        ]
     return calls
+
+
+def name_processor() -> str:
+    """What the times were measured on, as far as the system tells."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:  # not Linux
+        lines = []
+    models = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return models[0] if models else platform.processor()
 
 
 def summarize_calls(label: str, calls: Sequence[Call]) -> Summary:

@@ -371,7 +371,12 @@ def test_auto_says_what_it_chose():
     free = guidance.solve_pdg(START, TARGET)
     assert free.method == "indirect"
     assert free.solves == 0
-    for limits in ({"lander": Lander(pointing_limit=0.4)}, {"speed_limit": 45.0}, {"glide_slope_limit": 0.3}):
+    choices: list[dict[str, Any]] = [
+        {"lander": Lander(pointing_limit=0.4)},
+        {"speed_limit": 45.0},
+        {"glide_slope_limit": 0.3},
+    ]
+    for limits in choices:
         bound = guidance.solve_pdg(START, TARGET, **limits)
         convex = guidance.solve_pdg(START, TARGET, method="convex", **limits)
         assert bound.method == "convex"
