@@ -25,7 +25,7 @@ from guidance.descent.problem import LandingProblem, lies_below
 from guidance.lander import Lander
 from guidance.pdg.solve import PlanningMethod, replan
 from guidance.state import State
-from guidance.tracking.reference import TrackingReference, make_reference
+from guidance.tracking.reference import TrackingReference, hold_thrust, make_reference
 from guidance.validation import finite_number, finite_vector
 
 
@@ -211,7 +211,8 @@ def sample_descent(
     """
     periods = round(plan.time_of_flight / control_period)
     times = control_period * np.arange(periods + 1)
-    position, velocity = plan.states_at(np.minimum(times, plan.time_of_flight))
+    flown = plan.states_at(np.minimum(times, plan.time_of_flight))
+    position, velocity = hold_thrust(*flown, control_period, plan.problem.gravity)
     drift = np.array([0.0, 0.0, -sinking])
     position = position + drift * (times - plan.time_of_flight)[:, None]
     velocity = velocity + drift
