@@ -29,11 +29,12 @@ _MOST_STEPS = 30
 _CONVERGED = 1e-10  # largest residual, non-dimensional: a micrometre on the paper's descents
 _LATEST_FIRST_BURN = 0.5  # of the time before the braking burn, in a first guess
 _UNIT = 1e-6  # by which the square of a unit vector may differ from one
-_ANGLES = 4  # of the seven numbers of a step: two for each primer; three times follow
+ANGLES = 4
+"""Of the seven numbers of a step: two for each primer; three times follow."""
 
 
 @compile_kernel
-def _residuals(x: Extremal, problem: PrimerProblem, out: Array) -> None:
+def residuals(x: Extremal, problem: PrimerProblem, out: Array) -> None:
     """Seven equations of the module docstring, all non-dimensional."""
     t1, t2, final = x.times[0], x.times[1], x.times[2]
     r, v, g, flow = problem
@@ -55,7 +56,7 @@ def _residuals(x: Extremal, problem: PrimerProblem, out: Array) -> None:
 
 
 @compile_kernel
-def _move(x: Extremal, frame: Array, step: Array, out: Extremal) -> None:
+def move_extremal(x: Extremal, frame: Array, step: Array, out: Extremal) -> None:
     """Apply a step: two angles of q1 and of q2 in their tangent frames, and the three times."""
     for k in range(2):
         size = 0.0
@@ -67,7 +68,7 @@ def _move(x: Extremal, frame: Array, step: Array, out: Extremal) -> None:
         for axis in range(3):
             out.primer[k, axis] /= math.sqrt(size)
     for k in range(3):
-        out.times[k] = x.times[k] + step[_ANGLES + k]
+        out.times[k] = x.times[k] + step[ANGLES + k]
 
 
 @compile_kernel
@@ -132,22 +133,39 @@ def solve_linear(matrix: Array, vector: Array) -> bool:
 
 
 @compile_kernel
+def set_jacobian(
+    x: Extremal, problem: PrimerProblem, here: Array, frame: Array, trial: Extremal, jacobian: Array
+) -> None:
+    """Derivatives of the seven equations by the seven unknowns, from differences.
+
+    Args:
+        x: where, with a flight of about one unit of time.
+        problem: in the same units.
+        here: residuals at x, shape (7,).
+        frame: the answer's tangent frames of q1 and q2, shape (4, 3).
+        trial: is overwritten.
+        jacobian: the answer, shape (7, 7): a column for each angle of q1 and q2, for t1, t2 and T.
+    """
+    there, step = np.empty(7), np.zeros(7)
+    _set_frame(x, frame)
+    for k in range(7):
+        step[k] = (
+            -1e-7 if k == ANGLES and x.times[0] < 0.0 else 1e-7
+        )  # stay on one side of the kink at t1 = 0
+        move_extremal(x, frame, step, trial)
+        residuals(trial, problem, there)
+        for i in range(7):
+            jacobian[i, k] = (there[i] - here[i]) / step[k]
+        step[k] = 0.0
+
+
+@compile_kernel
 def _newton_step(
     x: Extremal, problem: PrimerProblem, here: Array, frame: Array, trial: Extremal
 ) -> tuple[Array, bool]:
     """Full step towards a root, from a difference Jacobian, and whether there is one."""
-    jacobian, there = np.empty((7, 7)), np.empty(7)
-    step = np.zeros(7)
-    _set_frame(x, frame)
-    for k in range(7):
-        step[k] = (
-            -1e-7 if k == _ANGLES and x.times[0] < 0.0 else 1e-7
-        )  # stay on one side of the kink at t1 = 0
-        _move(x, frame, step, trial)
-        _residuals(trial, problem, there)
-        for i in range(7):
-            jacobian[i, k] = (there[i] - here[i]) / step[k]
-        step[k] = 0.0
+    jacobian = np.empty((7, 7))
+    set_jacobian(x, problem, here, frame, trial, jacobian)
     full = -here
     found = solve_linear(jacobian, full)
     return full, found and bool(np.isfinite(full).all())
@@ -160,22 +178,22 @@ def _newton(x: Extremal, problem: PrimerProblem) -> bool:
     here, there = np.empty(7), np.empty(7)
     if not _admitted(x, problem.mass_flow):
         return False
-    _residuals(x, problem, here)
+    residuals(x, problem, here)
     for _ in range(_MOST_STEPS):
         if _norm(here) < _CONVERGED:
             return True
         full, found = _newton_step(x, problem, here, frame, trial)
         if not found:
             return False
-        turn, delay = _norm(full[:_ANGLES]), _norm(full[_ANGLES + 1 :])
+        turn, delay = _norm(full[:ANGLES]), _norm(full[ANGLES + 1 :])
         damping = min(1.0, 0.7 / max(1e-9, turn), 0.5 / max(1e-9, delay))
         before, better = math.sqrt(here @ here), False
         for _ in range(12):
             for number in range(7):
                 step[number] = damping * full[number]
-            _move(x, frame, step, trial)
+            move_extremal(x, frame, step, trial)
             if _admitted(trial, problem.mass_flow):
-                _residuals(trial, problem, there)
+                residuals(trial, problem, there)
                 if math.sqrt(there @ there) < (1.0 - 0.1 * damping) * before:
                     better = True
                     break
