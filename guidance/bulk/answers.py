@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from guidance.arrays import Array
-from guidance.bulk.certified_flight import INFEASIBLE, OPTIMAL, STATUSES, answer_start, vehicle_of
+from guidance.bulk.certified_flight import Finding, answer_start, vehicle_of
 from guidance.bulk.sampling import Nodes
 from guidance.bulk.starts import Starts
 from guidance.descent.certificate import Certificate
@@ -17,7 +17,11 @@ from guidance.descent.plan import PlanStatus
 from guidance.flight_time.neighbouring_extremals import new_extremal
 from guidance.lower_bound.proof import certify_cover
 
-__all__ = ["STATUSES", "Descents"]
+STATUSES = tuple(PlanStatus)
+"""What the numbers of a status array stand for."""
+OPTIMAL = STATUSES.index(PlanStatus.OPTIMAL)
+INFEASIBLE = STATUSES.index(PlanStatus.INFEASIBLE)
+UNDECIDED = STATUSES.index(PlanStatus.LIMIT_REACHED)
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +83,7 @@ class Descents:
             return self.certificates.get(index)
         starts = self.starts
         vehicle = vehicle_of(starts.lander, starts.gravity, starts.glide_slope_limit, starts.speed_limit)
-        answer, bound = answer_start(starts.states[index], starts.targets[index], vehicle, new_extremal())
-        infeasible = answer.status == INFEASIBLE
+        start, target = starts.states[index], starts.targets[index]
+        answer, bound = answer_start(start, target, vehicle, new_extremal(), True)
+        infeasible = answer.finding == Finding.INFEASIBLE
         return certify_cover(starts.problem(index), bound.spent_at_most, bound.times, bound.cover, infeasible)

@@ -3,26 +3,54 @@
 from __future__ import annotations
 
 import math
+from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
 
 from guidance.arrays import Array
-from guidance.descent.plan import PlanStatus
 from guidance.flight_time.extremal import Extremal, PrimerProblem, fly_extremal
-from guidance.flight_time.path_limits import PathLimits, keeps_limits
-from guidance.flight_time.primer_equations import solve_primer
+from guidance.flight_time.path_limits import KEPT, POINTING, PathLimits, broken_limit
+from guidance.flight_time.primer_equations import LEAST_PULL, MOST_PULL, solve_primer
 from guidance.kernel import compile_kernel
 from guidance.lander import Lander
 from guidance.lower_bound.dual_case import DualCase, chord_growth
-from guidance.lower_bound.neighbour_cover import bound_extremal
+from guidance.lower_bound.neighbour_cover import bound_by_neighbours, bound_extremal
 from guidance.lower_bound.time_cover import GRANTED, TimeCover, claimed_bound
 
-STATUSES = tuple(PlanStatus)
-"""What the numbers of a status array stand for."""
-OPTIMAL = STATUSES.index(PlanStatus.OPTIMAL)
-INFEASIBLE = STATUSES.index(PlanStatus.INFEASIBLE)
-UNDECIDED = STATUSES.index(PlanStatus.LIMIT_REACHED)
+
+class Finding(IntEnum):
+    """What the compiled code says of a start."""
+
+    OPTIMAL = 0
+    """A flight of least propellant, and a bound."""
+    INFEASIBLE = 1
+    """Proved: the tank pays for no flight."""
+    NO_FLIGHT = 2
+    """The iteration found no flight."""
+    TANK_TOO_SMALL = 3
+    """The flight found burns more than the tank holds; that all do is not proved."""
+    LEAST_THRUST = 4
+    """The engine cannot stop."""
+    NO_GRAVITY = 5
+    """Gravity is too weak beside the thrust."""
+    WEAK_ENGINE = 6
+    """Full thrust does not lift the vehicle."""
+    NOT_ABOVE = 7
+    """The start does not lie above the target, against gravity."""
+    LEANS = 8
+    """The flight of least propellant breaks the pointing limit."""
+    BELOW_GROUND = 9
+    """It goes below the target's altitude."""
+    TOO_FAST = 10
+    """It breaks the speed limit."""
+    OFF_GLIDE_SLOPE = 11
+    """It breaks the glide slope limit."""
+
+
+_OPTIMAL, _INFEASIBLE, _NO_FLIGHT, _TANK_TOO_SMALL = (int(finding) for finding in tuple(Finding)[:4])
+_LEAST_THRUST, _NO_GRAVITY, _WEAK_ENGINE, _NOT_ABOVE = (int(finding) for finding in tuple(Finding)[4:8])
+_LEANS = int(Finding.LEANS)  # the other limits follow in the order of `path_limits`
 
 
 class Vehicle(NamedTuple):
@@ -51,12 +79,12 @@ class Answer(NamedTuple):
     """What is known of one start.
 
     Attributes:
-        status: index into STATUSES: optimal, infeasible, or undecided.
+        finding: a `Finding`, as a number.
         propellant: [kg] that the flight burns; nan without one.
         lower_bound: [kg] no flight burns less; inf where there is none, nan where nothing is known.
     """
 
-    status: int
+    finding: int
     propellant: float
     lower_bound: float
 
@@ -73,6 +101,22 @@ class Bound(NamedTuple):
     spent_at_most: float
     times: Array
     cover: TimeCover
+
+
+class BoundAim(NamedTuple):
+    """What a bound is made for.
+
+    Attributes:
+        unit: [m/s^2] full thrust over start mass.
+        most: [m/s] it speaks of flights that spend no more.
+        target: [m/s] the level that is enough.
+        search: whether better primers are searched for where the neighbours' are weak.
+    """
+
+    unit: float
+    most: float
+    target: float
+    search: bool
 
 
 def vehicle_of(
@@ -118,30 +162,45 @@ def scale_start(state: Array, target: Array, vehicle: Vehicle) -> PrimerProblem:
 
 
 @compile_kernel
-def bound_start(
-    problem: PrimerProblem, unit: float, vehicle: Vehicle, x: Extremal, most: float, target: float
-) -> Bound:
-    """Bound what flights that spend at most `most` [m/s] spend, as well as `target` [m/s] asks."""
-    exhaust = vehicle.exhaust_velocity
-    cosine = max(vehicle.limits.least_cosine, -1.0)
+def domain_of(problem: PrimerProblem, min_thrust: float) -> int:
+    """Why the indirect method does not know a problem, as a `Finding`; OPTIMAL where it does."""
+    pull = problem.gravity @ problem.gravity
+    if min_thrust > 0.0:
+        return _LEAST_THRUST
+    if not pull > LEAST_PULL:
+        return _NO_GRAVITY
+    if not pull < MOST_PULL:
+        return _WEAK_ENGINE
+    return _OPTIMAL if problem.position @ problem.gravity < 0.0 else _NOT_ABOVE
+
+
+@compile_kernel
+def bound_start(problem: PrimerProblem, vehicle: Vehicle, x: Extremal, aim: BoundAim) -> Bound:
+    """Bound the velocity change of the flights of a problem, in seconds, from its extremal."""
+    exhaust, unit = vehicle.exhaust_velocity, aim.unit
     case = DualCase(
         unit * problem.position,
         unit * problem.velocity,
         np.zeros(3),
         vehicle.gravity,
         unit,
-        unit * chord_growth(most, exhaust),
+        unit * chord_growth(aim.most, exhaust),
         0.0,
         0.0,
-        cosine,
+        max(vehicle.limits.least_cosine, -1.0),
         vehicle.sine,
     )
-    times, cover = bound_extremal(x, problem, case, target, exhaust)
-    return Bound(most, times, cover)
+    if aim.search:
+        times, cover = bound_extremal(x, problem, case, aim.target, exhaust)
+    else:
+        times, cover = bound_by_neighbours(x, problem, case, aim.target, exhaust)
+    return Bound(aim.most, times, cover)
 
 
 @compile_kernel
-def answer_start(state: Array, target: Array, vehicle: Vehicle, x: Extremal) -> tuple[Answer, Bound]:
+def answer_start(
+    state: Array, target: Array, vehicle: Vehicle, x: Extremal, search: bool
+) -> tuple[Answer, Bound]:
     """Answer one start.
 
     Args:
@@ -149,31 +208,31 @@ def answer_start(state: Array, target: Array, vehicle: Vehicle, x: Extremal) -> 
         target: [m] shape (3,).
         vehicle: lander, gravity and limits.
         x: the extremal, where one was found; in seconds.
+        search: whether better primers are searched for where the bound is weak.
 
     Returns:
         The answer, and its proof; without a flight to prove anything of, an empty one.
     """
-    unknown = Answer(UNDECIDED, math.nan, math.nan)
     nothing = Bound(0.0, np.empty(0), TimeCover(np.empty((0, 6)), np.empty(0, np.int64), 0.0, 0.0, 0.0))
-    if vehicle.min_thrust > 0.0:
-        return unknown, nothing
-    mass, exhaust = state[6], vehicle.exhaust_velocity
-    unit = vehicle.max_thrust / mass
+    mass, exhaust, unit = state[6], vehicle.exhaust_velocity, vehicle.max_thrust / state[6]
     problem = scale_start(state, target, vehicle)
-    if not solve_primer(problem, x):
-        return unknown, nothing
-    share = problem.mass_flow * (max(x.times[0], 0.0) + x.times[2] - x.times[1])
+    outside = domain_of(problem, vehicle.min_thrust)
+    if outside != _OPTIMAL:
+        return Answer(outside, math.nan, math.nan), nothing
+    found = solve_primer(problem, x)
+    share = problem.mass_flow * (max(x.times[0], 0.0) + x.times[2] - x.times[1]) if found else 1.0
     if not share < 1.0:
-        return unknown, nothing
+        return Answer(_NO_FLIGHT, math.nan, math.nan), nothing
     spent, tank = -exhaust * math.log1p(-share), exhaust * math.log(mass / vehicle.dry_mass)
     if spent > tank:
         enough = tank + 2.0 * GRANTED * exhaust
-        bound = bound_start(problem, unit, vehicle, x, tank, enough)
+        bound = bound_start(problem, vehicle, x, BoundAim(unit, tank, enough, search))
         if bound.cover.level >= enough:
-            return Answer(INFEASIBLE, math.nan, math.inf), bound
-        return unknown, nothing
-    if not keeps_limits(fly_extremal(x, problem), vehicle.limits, unit):
-        return unknown, nothing
-    bound = bound_start(problem, unit, vehicle, x, spent, spent)
+            return Answer(_INFEASIBLE, math.nan, math.inf), bound
+        return Answer(_TANK_TOO_SMALL, math.nan, math.nan), nothing
+    broken = broken_limit(fly_extremal(x, problem), vehicle.limits, unit)
+    if broken != KEPT:
+        return Answer(_LEANS + broken - POINTING, math.nan, math.nan), nothing
+    bound = bound_start(problem, vehicle, x, BoundAim(unit, spent, spent, search))
     least = claimed_bound(bound.cover.level, spent, exhaust)
-    return Answer(OPTIMAL, mass * share, mass * -math.expm1(-least / exhaust)), bound
+    return Answer(_OPTIMAL, mass * share, mass * -math.expm1(-least / exhaust)), bound

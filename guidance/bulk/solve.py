@@ -11,16 +11,8 @@ import numpy.typing as npt
 from numpy.typing import ArrayLike
 
 from guidance.arrays import Array
-from guidance.bulk.answers import Descents
-from guidance.bulk.certified_flight import (
-    OPTIMAL,
-    STATUSES,
-    UNDECIDED,
-    Vehicle,
-    answer_start,
-    scale_start,
-    vehicle_of,
-)
+from guidance.bulk.answers import INFEASIBLE, OPTIMAL, STATUSES, UNDECIDED, Descents
+from guidance.bulk.certified_flight import Finding, Vehicle, answer_start, scale_start, vehicle_of
 from guidance.bulk.sampling import Nodes, no_nodes, sample_extremal, sample_plan, set_thrust
 from guidance.bulk.starts import Starts
 from guidance.constants import MOON_GRAVITY
@@ -36,6 +28,7 @@ from guidance.validation import finite_number
 _CHUNK = 64  # starts that a thread takes at once
 _FEWEST_NODES = 2
 _INDIRECT = "indirect"
+_OPTIMAL_FOUND, _INFEASIBLE_FOUND = int(Finding.OPTIMAL), int(Finding.INFEASIBLE)
 
 
 class _Rows(NamedTuple):
@@ -54,10 +47,13 @@ def _answer_rows(begin: int, end: int, states: Array, targets: Array, vehicle: V
     """Answer the starts of some rows."""
     x = new_extremal()
     for k in range(begin, end):
-        answer, _ = answer_start(states[k], targets[k], vehicle, x)
-        rows.status[k], rows.lower_bound[k] = answer.status, answer.lower_bound
-        if answer.status != OPTIMAL:
+        answer, _ = answer_start(states[k], targets[k], vehicle, x, True)
+        rows.lower_bound[k] = answer.lower_bound
+        if answer.finding == _INFEASIBLE_FOUND:
+            rows.status[k] = INFEASIBLE
+        if answer.finding != _OPTIMAL_FOUND:
             continue
+        rows.status[k] = OPTIMAL
         rows.propellant[k], rows.time_of_flight[k] = answer.propellant, x.times[2]
         set_thrust(x, 0.0, vehicle.max_thrust, rows.first_thrust[k])
         if rows.nodes.time.shape[1] > 0:

@@ -1,4 +1,4 @@
-"""Whether a flown extremal keeps the limits on its path and on its thrust's direction."""
+"""The limits on the path and on the thrust's direction that a flown extremal breaks."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import NamedTuple
 from guidance.flight_time.extremal import LEGS, PrimerPath
 from guidance.kernel import compile_kernel
 
+KEPT, POINTING, ALTITUDE, SPEED, GLIDE_SLOPE = range(5)
 _BELOW = 1e-6  # of the largest coordinate: rounding, at the target's altitude
 
 
@@ -26,8 +27,8 @@ class PathLimits(NamedTuple):
 
 
 @compile_kernel
-def keeps_limits(path: PrimerPath, limits: PathLimits, unit: float) -> bool:
-    """Whether a path keeps every limit at its nodes, and lies nowhere below the target's altitude.
+def broken_limit(path: PrimerPath, limits: PathLimits, unit: float) -> int:
+    """The first limit that a path breaks at its nodes: POINTING, ALTITUDE, SPEED, GLIDE_SLOPE; else KEPT.
 
     Args:
         path: in seconds, origin at the target.
@@ -47,14 +48,16 @@ def keeps_limits(path: PrimerPath, limits: PathLimits, unit: float) -> bool:
             lowest = min(lowest, unit * path.position[k, 2])
         burning = k <= LEGS or k >= 2 * LEGS
         if burning and path.direction[k, 2] < limits.least_cosine:
-            return False
-    if lowest < -_BELOW * largest or fastest > (limits.speed / unit) ** 2:
-        return False
+            return POINTING
+    if lowest < -_BELOW * largest:
+        return ALTITUDE
+    if fastest > (limits.speed / unit) ** 2:
+        return SPEED
     if limits.glide_slope == math.inf:
-        return True
+        return KEPT
     cosine, sine = math.cos(limits.glide_slope), math.sin(limits.glide_slope)
     for k in range(last):
         x, y, z = unit * path.position[k, 0], unit * path.position[k, 1], unit * path.position[k, 2]
         if math.hypot(x, y) * cosine > z * sine:
-            return False
-    return True
+            return GLIDE_SLOPE
+    return KEPT

@@ -29,6 +29,8 @@ _MOST_STEPS = 30
 _CONVERGED = 1e-10  # largest residual, non-dimensional: a micrometre on the paper's descents
 _LATEST_FIRST_BURN = 0.5  # of the time before the braking burn, in a first guess
 _UNIT = 1e-6  # by which the square of a unit vector may differ from one
+LEAST_PULL, MOST_PULL = 1e-6, 0.98
+"""Between these lies the square of gravity over full thrust per start mass."""
 ANGLES = 4
 """Of the seven numbers of a step: two for each primer; three times follow."""
 
@@ -261,7 +263,7 @@ def solve_primer(problem: PrimerProblem, x: Extremal) -> bool:
         Whether there was a first guess, and Newton's method converged from it.
     """
     r, v, g, flow = problem
-    if not 1e-6 < g @ g < 0.98 or not r @ g < 0.0:
+    if not LEAST_PULL < g @ g < MOST_PULL or not r @ g < 0.0:
         return False
     for attempt in range(2):
         if not _guess(problem, attempt == 0, x):

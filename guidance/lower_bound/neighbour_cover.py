@@ -39,6 +39,7 @@ _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 _BEYOND = 1.2  # times the distance from the best time to an open cell: there the next primer is taken
 _GROWTH = 4.0  # of that distance from one primer to the next, at most
 _TRIES = 2  # at a cell's own time, each from the neighbours of the one before
+_BEFORE = 1.0 - 1e-9  # of the best time: a node of the grid lies at it, up to rounding
 _EARLIEST = 0.1  # of the best time
 _IMPULSES = 1.02  # times the level: where two impulses spend so much, their primer is enough
 _CELLS, _FINE_CELLS = 70, 240  # of the grid of times, up to the best time; where the search has to help
@@ -123,7 +124,7 @@ def cover_by_neighbours(
         primers[count] = primer
         join_cover(primer, count, times, case, envelope, owner)
         if count == 2:
-            best_value = float(envelope[int(np.searchsorted(times, best_time)) - 1])
+            best_value = float(envelope[int(np.searchsorted(times, _BEFORE * best_time)) - 1])
             level = min(level, best_value - aim.tolerance)
         count += 1
         cell = nearest_open_cell(envelope, times, level, best_time)
@@ -154,6 +155,16 @@ def cover_by_neighbours(
 
 
 @compile_kernel
+def bound_by_neighbours(
+    x: Extremal, problem: PrimerProblem, case: DualCase, target: float, exhaust: float
+) -> tuple[Array, TimeCover]:
+    """What neighbours alone prove; arguments and answer as of `bound_extremal`."""
+    aim = CoverAim(target, _TOLERANCE * exhaust, -np.inf)
+    times = time_grid(case, target * (1.0 + 1e-12), x.times[2], _CELLS)
+    return times, cover_by_neighbours(find_neighbours(x, problem), problem, times, case, aim)
+
+
+@compile_kernel
 def bound_extremal(
     x: Extremal, problem: PrimerProblem, case: DualCase, target: float, exhaust: float
 ) -> tuple[Array, TimeCover]:
@@ -171,9 +182,7 @@ def bound_extremal(
     Returns:
         [s] The grid of times, and the cover of its cells.
     """
-    aim = CoverAim(target, _TOLERANCE * exhaust, -np.inf)
-    times = time_grid(case, target * (1.0 + 1e-12), x.times[2], _CELLS)
-    cover = cover_by_neighbours(find_neighbours(x, problem), problem, times, case, aim)
+    times, cover = bound_by_neighbours(x, problem, case, target, exhaust)
     if cover.level >= target - _WEAK * exhaust:
         return times, cover
     fine = time_grid(case, target * (1.0 + 1e-12), x.times[2], _FINE_CELLS)

@@ -22,6 +22,7 @@ _FIRST_STRIDE = 5e-3  # of the time of flight
 _NUDGE = 0.03  # towards the primer of two impulses: one that is best at another time may lie on a kink of D
 _FIRST_SCALE = 1.1  # of the primer of two impulses: longer than one, its thrust burns somewhere
 _STRETCH = 1.7  # of the distance from the best time
+_NEARER = 1.0 - 1e-9  # than another cell: what lies further inside is rounding
 MOST_PRIMERS = 160
 """A cover that needs more is given up as it stands."""
 GRANTED = 1e-7
@@ -137,11 +138,14 @@ def _beyond(time: float, best_time: float, again: bool, times: Array) -> float:
 
 @compile_kernel
 def nearest_open_cell(envelope: Array, times: Array, level: float, best_time: float) -> int:
-    """The cell nearest to the best time whose bound lies below the level; -1 where there is none."""
+    """The cell nearest to the best time whose bound lies below the level; -1 where there is none.
+
+    Of two that are as near, up to rounding, it is the earlier one.
+    """
     nearest, least = -1, np.inf
     for k in range(envelope.size):
         away = abs(0.5 * (times[k] + times[k + 1]) - best_time)
-        if envelope[k] < level and away < least:
+        if envelope[k] < level and away < _NEARER * least:
             nearest, least = k, away
     return nearest
 
