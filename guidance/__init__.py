@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING
 from guidance.exports import lazy_exports
 
 if TYPE_CHECKING:
+    from guidance.bulk.answers import Descents
+    from guidance.bulk.solve import solve_pdg_many
     from guidance.constants import MOON_GRAVITY, STANDARD_GRAVITY
     from guidance.descent.plan import GuidanceError, InfeasibleError, Plan, PlanStatus, SolverFailedError
     from guidance.dynamics import propagate
     from guidance.lander import PAPER_LANDER, Lander
-    from guidance.pdg.solve import solve_pdg
+    from guidance.pdg.prepared import solve_pdg
     from guidance.state import State
     from guidance.zem_zev import saturate_thrust, time_to_go, zem_zev_acceleration
 
@@ -20,6 +22,7 @@ __all__ = [
     "MOON_GRAVITY",
     "PAPER_LANDER",
     "STANDARD_GRAVITY",
+    "Descents",
     "GuidanceError",
     "InfeasibleError",
     "Lander",
@@ -30,6 +33,7 @@ __all__ = [
     "propagate",
     "saturate_thrust",
     "solve_pdg",
+    "solve_pdg_many",
     "time_to_go",
     "zem_zev_acceleration",
 ]
@@ -40,6 +44,7 @@ __getattr__, __dir__ = lazy_exports(
         "MOON_GRAVITY": "guidance.constants",
         "PAPER_LANDER": "guidance.lander",
         "STANDARD_GRAVITY": "guidance.constants",
+        "Descents": "guidance.bulk.answers",
         "GuidanceError": "guidance.descent.plan",
         "InfeasibleError": "guidance.descent.plan",
         "Lander": "guidance.lander",
@@ -49,7 +54,8 @@ __getattr__, __dir__ = lazy_exports(
         "State": "guidance.state",
         "propagate": "guidance.dynamics",
         "saturate_thrust": "guidance.zem_zev",
-        "solve_pdg": "guidance.pdg.solve",
+        "solve_pdg": "guidance.pdg.prepared",
+        "solve_pdg_many": "guidance.bulk.solve",
         "time_to_go": "guidance.zem_zev",
         "zem_zev_acceleration": "guidance.zem_zev",
     },

@@ -6,6 +6,7 @@ machine.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
@@ -14,7 +15,7 @@ import numpy as np
 import tyro
 from rich.console import Console
 
-from guidance import solve_pdg
+from guidance import solve_pdg, solve_pdg_many
 from guidance.console import tolerate_encoding
 from guidance.descent.residuals import fly_residuals
 from guidance.validation import finite_number
@@ -28,6 +29,8 @@ from studies.columns import Column, console_table, write_csv
 from studies.speed_ratios import COLUMNS as RATIO_COLUMNS
 from studies.speed_ratios import SpeedRatio, measure_ratios
 from studies.terrain_timing import measure_terrain
+
+_BULK, _BULK_CALLS = 2000, 20  # starts of a call, and calls
 
 
 @dataclass(frozen=True)
@@ -115,6 +118,20 @@ def measure_plans(options: Bench) -> dict[str, np.ndarray]:
     return {"plan (solve_pdg)": plans, "of which the flight that checks it": checks}
 
 
+def measure_bulk(options: Bench) -> dict[str, np.ndarray]:
+    """Wall time [s] that a start takes among thousands, on all cores: those of the episodes, many times."""
+    scenarios = [sample_scenario(options.preset, 0, episode, "tuning") for episode in range(options.episodes)]
+    view, again = scenarios[0].view, math.ceil(_BULK / options.episodes)
+    states = np.tile([scenario.initial_state.as_array() for scenario in scenarios], (again, 1))
+    targets = np.tile([scenario.view.nominal_target for scenario in scenarios], (again, 1))
+    times = []
+    for _ in range(_BULK_CALLS + 1):
+        start = perf_counter()
+        solve_pdg_many(states, targets, lander=view.lander, gravity=view.gravity)
+        times.append((perf_counter() - start) / len(states))
+    return {"a start in bulk (solve_pdg_many, all cores)": np.array(times[1:])}
+
+
 def bench(options: Bench) -> tuple[list[Work], list[SpeedRatio]]:
     """Measure, write times.csv, ratios.csv and provenance.json, and print both tables.
 
@@ -124,7 +141,7 @@ def bench(options: Bench) -> tuple[list[Work], list[SpeedRatio]]:
     """
     finite_number("episodes", options.episodes, at_least=1)
     out, console = open_folder(options.out), Console(width=max(Console().width, 120))
-    measured = measure_steps(options) | measure_plans(options)
+    measured = measure_steps(options) | measure_plans(options) | measure_bulk(options)
     works = [Work(name, *np.quantile(seconds, (0.5, 0.99))) for name, seconds in measured.items()]
     works += [Work(wall.name, wall.median, max(wall.seconds)) for wall in measure_terrain(options.repeats)]
     ratios = measure_ratios(options.preset)
@@ -134,6 +151,8 @@ def bench(options: Bench) -> tuple[list[Work], list[SpeedRatio]]:
     title = f"preset {options.preset}, {options.episodes} episodes; one core unless said"
     console.print(console_table(COLUMNS, works, title))
     console.print(console_table(RATIO_COLUMNS, ratios, "processor times as ratios, and the limits they keep"))
+    (bulk,) = (work for work in works if "solve_pdg_many" in work.name)
+    console.print(f"{bulk.name}: {1.0 / bulk.median:.0f} starts a second")
     console.print(f"results in {out}")
     return works, ratios
 

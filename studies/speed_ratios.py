@@ -16,7 +16,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from guidance import solve_pdg
+from guidance import solve_pdg, solve_pdg_many
 from guidance.validation import finite_number
 from hda.flight.episode import begin_flight, observe
 from hda.task.scenario import sample_scenario
@@ -26,6 +26,7 @@ from studies.columns import Column
 Result = TypeVar("Result")
 
 _CALLS = 10  # of work that is too short for one
+_STARTS = 40  # times the starts that are measured, in one call in bulk
 _UPDATE_ROUNDS = 5  # at most: one takes seconds
 _IMPORT = "import time; s = time.process_time(); import {module}; print(time.process_time() - s)"
 
@@ -33,6 +34,8 @@ FREE_TO_FIXED_LIMIT = 2.0
 """Most that a free-time solve of the convex method may cost, in fixed-time solves of the same nodes."""
 EXACT_TO_MESH_LIMIT = 0.125
 """Most that `solve_pdg` may cost where the indirect method answers, in solves of the convex method."""
+BULK_LIMIT = 0.5
+"""Most that a start of `solve_pdg_many` may cost, in calls of `solve_pdg`."""
 ENCODING_LIMIT = 7.0
 """Most that encoding a look may cost, in looks."""
 UPDATE_LIMIT = 0.93
@@ -95,6 +98,7 @@ def measure_ratios(preset: str = "paper", repeats: int = 15) -> list[SpeedRatio]
     finite_number("repeats", repeats, at_least=1)
     return [
         *_compare_solves(preset, repeats),
+        _compare_bulk(preset, repeats),
         _compare_encoding(preset, repeats),
         _compare_updates(min(repeats, _UPDATE_ROUNDS)),
         _compare_imports(repeats),
@@ -118,6 +122,20 @@ def _compare_solves(preset: str, repeats: int) -> tuple[SpeedRatio, SpeedRatio]:
         SpeedRatio("solve_pdg", "its convex method", _median(exact), _median(free), EXACT_TO_MESH_LIMIT),
         SpeedRatio("free-time solve", "fixed-time solve", _median(free), _median(fixed), FREE_TO_FIXED_LIMIT),
     )
+
+
+def _compare_bulk(preset: str, repeats: int) -> SpeedRatio:
+    scenarios = [sample_scenario(preset, 0, episode, "tuning") for episode in range(repeats + 1)]
+    view = scenarios[0].view
+    options = {"lander": view.lander, "gravity": view.gravity}
+    states = np.array([scenario.initial_state.as_array() for scenario in scenarios])
+    targets = np.array([scenario.view.nominal_target for scenario in scenarios])
+    many = np.tile(states, (_STARTS, 1)), np.tile(targets, (_STARTS, 1))
+    bulk, single = [], []
+    for state, target in zip(states, targets, strict=True):
+        bulk.append(_time(partial(solve_pdg_many, *many, **options))[1] / len(many[0]))
+        single.append(_time(partial(solve_pdg, state, target, **options))[1])
+    return SpeedRatio("a start in bulk", "a single solve", _median(bulk), _median(single), BULK_LIMIT)
 
 
 def _compare_encoding(preset: str, repeats: int) -> SpeedRatio:

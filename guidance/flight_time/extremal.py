@@ -77,8 +77,8 @@ class PrimerPath(NamedTuple):
 
 
 @compile_kernel
-def primer_at(x: Extremal, time: float, p: Array) -> None:
-    """Primer vector at a time."""
+def set_primer(x: Extremal, time: float, p: Array) -> None:
+    """Write the primer vector at a time, shape (3,)."""
     fraction = (time - x.times[0]) / (x.times[1] - x.times[0])
     for axis in range(3):
         p[axis] = x.primer[0, axis] + (x.primer[1, axis] - x.primer[0, axis]) * fraction
@@ -91,7 +91,7 @@ def add_burn(x: Extremal, burn: Burn, mass_flow: float, then: float, out: Array)
     p = np.empty(3)
     for k in range(_POINTS.size):
         elapsed = half * (1.0 + _POINTS[k])
-        primer_at(x, burn.begin + elapsed, p)
+        set_primer(x, burn.begin + elapsed, p)
         size = math.sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2])
         impulse = half * _WEIGHTS[k] / ((burn.mass - mass_flow * elapsed) * max(size, 1e-12))
         for axis in range(3):
@@ -112,8 +112,8 @@ def fly_extremal(x: Extremal, problem: PrimerProblem) -> PrimerPath:
     for axis in range(3):
         state[axis], state[3 + axis] = problem.position[axis], problem.velocity[axis]
     for k in range(points):
-        primer_at(x, time, p)
-        size = max(math.sqrt(p @ p), 1e-12)
+        set_primer(x, time, p)
+        size = max(math.sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]), 1e-12)
         for axis in range(3):
             path.position[k, axis], path.velocity[k, axis] = state[axis], state[3 + axis]
             path.direction[k, axis] = p[axis] / size

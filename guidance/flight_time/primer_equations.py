@@ -23,18 +23,21 @@ import numpy as np
 
 from guidance.arrays import Array
 from guidance.flight_time.extremal import Burn, Extremal, PrimerProblem, add_burn
-from guidance.flight_time.linear_system import solve_linear
+from guidance.flight_time.linear_system import dot, solve_linear
 from guidance.kernel import compile_kernel
 
 _MOST_STEPS = 30
 _CONVERGED = 1e-10  # largest residual, non-dimensional: a micrometre on the paper's descents
 _LATEST_FIRST_BURN = 0.5  # of the time before the braking burn, in a first guess
 _UNIT = 1e-6  # by which the square of a unit vector may differ from one
-_ANGLES = 4  # of the seven numbers of a step: two for each primer; three times follow
+LEAST_PULL, MOST_PULL = 1e-6, 0.98
+"""Between these lies the square of gravity over full thrust per start mass."""
+ANGLES = 4
+"""Of the seven numbers of a step: two for each primer; three times follow."""
 
 
 @compile_kernel
-def _residuals(x: Extremal, problem: PrimerProblem, out: Array) -> None:
+def residuals(x: Extremal, problem: PrimerProblem, out: Array) -> None:
     """Seven equations of the module docstring, all non-dimensional."""
     t1, t2, final = x.times[0], x.times[1], x.times[2]
     r, v, g, flow = problem
@@ -56,7 +59,7 @@ def _residuals(x: Extremal, problem: PrimerProblem, out: Array) -> None:
 
 
 @compile_kernel
-def _move(x: Extremal, frame: Array, step: Array, out: Extremal) -> None:
+def move_extremal(x: Extremal, frame: Array, step: Array, out: Extremal) -> None:
     """Apply a step: two angles of q1 and of q2 in their tangent frames, and the three times."""
     for k in range(2):
         size = 0.0
@@ -68,7 +71,7 @@ def _move(x: Extremal, frame: Array, step: Array, out: Extremal) -> None:
         for axis in range(3):
             out.primer[k, axis] /= math.sqrt(size)
     for k in range(3):
-        out.times[k] = x.times[k] + step[_ANGLES + k]
+        out.times[k] = x.times[k] + step[ANGLES + k]
 
 
 @compile_kernel
@@ -84,10 +87,13 @@ def _set_frame(x: Extremal, frame: Array) -> None:
     """Two unit vectors normal to q1, and two to q2."""
     for k in range(2):
         q = x.primer[k]
-        axis = np.argmin(np.abs(q))
+        axis = 0
+        for i in range(1, 3):
+            if abs(q[i]) < abs(q[axis]):
+                axis = i
         first = -q[axis] * q
         first[axis] += 1.0
-        first /= math.sqrt(first @ first)
+        first /= math.sqrt(dot(first, first))
         for i in range(3):
             j, h = (i + 1) % 3, (i + 2) % 3
             frame[2 * k, i] = first[i]
@@ -96,12 +102,18 @@ def _set_frame(x: Extremal, frame: Array) -> None:
 
 @compile_kernel
 def _norm(values: Array) -> float:
-    return float(np.max(np.abs(values)))
+    """Largest magnitude; nan where a value is."""
+    largest = 0.0
+    for value in values:
+        if math.isnan(value):
+            return value
+        largest = max(largest, abs(value))
+    return largest
 
 
 @compile_kernel
 def _length(values: Array) -> float:
-    return math.sqrt(values @ values)
+    return math.sqrt(dot(values, values))
 
 
 @compile_kernel
@@ -112,29 +124,44 @@ def _admitted(x: Extremal, mass_flow: float) -> bool:
 
 
 @compile_kernel
-def _newton_step(
-    x: Extremal, problem: PrimerProblem, here: Array, frame: Array, trial: Extremal
-) -> tuple[Array, bool]:
-    """Full step towards a root, from a difference Jacobian, and whether there is one.
+def set_jacobian(
+    x: Extremal, problem: PrimerProblem, here: Array, frame: Array, trial: Extremal, jacobian: Array
+) -> None:
+    """Derivatives of the seven equations by the seven unknowns, from differences.
 
-    As many equations and unknowns as `here` has: with six the time of flight is held.
+    Args:
+        x: where, with a flight of about one unit of time.
+        problem: in the same units.
+        here: residuals at x, shape (7,).
+        frame: the answer's tangent frames of q1 and q2, shape (4, 3).
+        trial: is overwritten.
+        jacobian: the answer, shape (7, 7): a column for each angle of q1 and q2, for t1, t2 and T.
     """
-    size = here.size
-    jacobian, there = np.empty((size, size)), np.empty(7)
-    step = np.zeros(7)
+    there, step = np.empty(7), np.zeros(7)
     _set_frame(x, frame)
-    for k in range(size):
+    for k in range(7):
         step[k] = (
-            -1e-7 if k == _ANGLES and x.times[0] < 0.0 else 1e-7
+            -1e-7 if k == ANGLES and x.times[0] < 0.0 else 1e-7
         )  # stay on one side of the kink at t1 = 0
-        _move(x, frame, step, trial)
-        _residuals(trial, problem, there)
-        for i in range(size):
+        move_extremal(x, frame, step, trial)
+        residuals(trial, problem, there)
+        for i in range(7):
             jacobian[i, k] = (there[i] - here[i]) / step[k]
         step[k] = 0.0
-    full = -here
-    found = solve_linear(jacobian, full)
-    return full, found and bool(np.isfinite(full).all())
+
+
+@compile_kernel
+def _newton_step(
+    x: Extremal, problem: PrimerProblem, here: Array, size: int, frame: Array, trial: Extremal
+) -> tuple[Array, bool]:
+    """Full step towards a root in the first `size` unknowns, from a difference Jacobian; if there is one."""
+    jacobian = np.empty((7, 7))
+    set_jacobian(x, problem, here, frame, trial, jacobian)
+    full = -here[:size]
+    found = solve_linear(jacobian[:size, :size], full)
+    for value in full:
+        found = found and math.isfinite(value)
+    return full, found
 
 
 @compile_kernel
@@ -144,22 +171,22 @@ def _newton(x: Extremal, problem: PrimerProblem, size: int) -> bool:
     here, there = np.empty(7), np.empty(7)
     if not _admitted(x, problem.mass_flow):
         return False
-    _residuals(x, problem, here)
+    residuals(x, problem, here)
     for _ in range(_MOST_STEPS):
         if _norm(here[:size]) < _CONVERGED:
             return True
-        full, found = _newton_step(x, problem, here[:size], frame, trial)
+        full, found = _newton_step(x, problem, here, size, frame, trial)
         if not found:
             return False
-        turn, delay = _norm(full[:_ANGLES]), _norm(full[_ANGLES + 1 :])
+        turn, delay = _norm(full[:ANGLES]), _norm(full[ANGLES + 1 :])
         damping = min(1.0, 0.7 / max(1e-9, turn), 0.5 / max(1e-9, delay))
         before, better = _length(here[:size]), False
         for _ in range(12):
             for number in range(size):
                 step[number] = damping * full[number]
-            _move(x, frame, step, trial)
+            move_extremal(x, frame, step, trial)
             if _admitted(trial, problem.mass_flow):
-                _residuals(trial, problem, there)
+                residuals(trial, problem, there)
                 if _length(there[:size]) < (1.0 - 0.1 * damping) * before:
                     better = True
                     break
@@ -181,38 +208,38 @@ def _guess(problem: PrimerProblem, first_burn: bool, x: Extremal) -> bool:
         Whether there is one: next to the target's plane a primer may be too long for floating point.
     """
     r, v, gravity, _ = problem
-    up = -gravity / math.sqrt(gravity @ gravity)
-    g = math.sqrt(gravity @ gravity)
-    height, climb = r @ up, v @ up
+    g = math.sqrt(dot(gravity, gravity))
+    up = -gravity / g
+    height, climb = dot(r, up), dot(v, up)
     coast = (2.0 * (1.0 - g) * height - climb * climb) / 2.0
     ignition_speed = math.sqrt(max(climb * climb + 2.0 * g * coast, 1e-6 * g * abs(height)))
     t2 = max((ignition_speed + climb) / g, 1e-2 * ignition_speed / g)
     final = t2 + ignition_speed / (1.0 - g)
     across = (r - height * up) / (0.5 * (t2 + final))
     kick = -across - (v - climb * up)
-    size = math.sqrt(kick @ kick)
+    size = math.sqrt(dot(kick, kick))
     q2 = across + (ignition_speed + g * (final - t2)) * up
-    q2 /= math.sqrt(q2 @ q2)
+    q2 /= math.sqrt(dot(q2, q2))
     t1 = min(t2 - 2.0 * ignition_speed / g, -1e-3 * t2)
     if first_burn and size > 1e-9 * ignition_speed:
         t1 = size if size < 0.8 * t2 else _LATEST_FIRST_BURN * t2
         speed = v + kick
         sine, cosine = 1.0, 0.0
         for _ in range(5):  # the Hamiltonian at t1
-            gap = (speed @ up) - g * (t2 - t1)
+            gap = dot(speed, up) - g * (t2 - t1)
             if gap == 0.0:
                 break
-            cosine = ((q2 @ speed) - sine * (kick @ speed) / size) / gap
+            cosine = (dot(q2, speed) - sine * dot(kick, speed) / size) / gap
             cosine = min(max(cosine, -0.95), 0.95)
             sine = math.sqrt(1.0 - cosine * cosine)
         q1 = sine * kick / size + cosine * up
     else:
         q1 = 0.1 * kick / ignition_speed - up
-        q1 /= math.sqrt(q1 @ q1)
+        q1 /= math.sqrt(dot(q1, q1))
     for axis in range(3):
         x.primer[0, axis], x.primer[1, axis] = q1[axis], q2[axis]
     x.times[0], x.times[1], x.times[2] = t1, t2, final
-    return bool(abs(q1 @ q1 - 1.0) < _UNIT and abs(q2 @ q2 - 1.0) < _UNIT)
+    return abs(dot(q1, q1) - 1.0) < _UNIT and abs(dot(q2, q2) - 1.0) < _UNIT
 
 
 @compile_kernel
@@ -245,8 +272,8 @@ def solve_primer(problem: PrimerProblem, x: Extremal) -> bool:
     Returns:
         Whether there was a first guess, and Newton's method converged from it.
     """
-    g = problem.gravity
-    if not 1e-6 < g @ g < 0.98 or not problem.position @ g < 0.0:
+    r, g = problem.position, problem.gravity
+    if not LEAST_PULL < dot(g, g) < MOST_PULL or not dot(r, g) < 0.0:
         return False
     for attempt in range(2):
         if not _guess(problem, attempt == 0, x):

@@ -10,7 +10,7 @@ import numpy as np
 from guidance.arrays import Array
 from guidance.descent.problem import LandingProblem
 from guidance.descent.trajectory import Trajectory
-from guidance.flight_time.extremal import Burn, Extremal, PrimerProblem, add_burn, primer_at
+from guidance.flight_time.extremal import Burn, Extremal, PrimerProblem, add_burn, set_primer
 from guidance.flight_time.primer_vector import PrimerFlight
 from guidance.kernel import compile_kernel
 
@@ -104,7 +104,7 @@ def _burning(x: Extremal, time: float) -> bool:
 @compile_kernel
 def _set_thrust(x: Extremal, time: float, out: Array) -> None:
     """Unit vector of the primer, shape (3,)."""
-    primer_at(x, time, out)
+    set_primer(x, time, out)
     size = max(math.sqrt(out[0] * out[0] + out[1] * out[1] + out[2] * out[2]), 1e-12)
     for axis in range(3):
         out[axis] /= size

@@ -20,6 +20,7 @@ import numpy as np
 
 from guidance.arrays import Array
 from guidance.descent.problem import LandingProblem
+from guidance.kernel import compile_kernel
 
 
 class DualCase(NamedTuple):
@@ -50,6 +51,12 @@ class DualCase(NamedTuple):
     sine: float
 
 
+@compile_kernel
+def chord_growth(most: float, exhaust: float) -> float:
+    """[s/m] kappa: the chord of the thrust acceleration's growth over the velocity changes up to `most`."""
+    return math.expm1(most / exhaust) / most if most > 0.0 else 1.0 / exhaust
+
+
 def dual_case(problem: LandingProblem, most: float) -> DualCase:
     """The relaxation for flights of a landing problem that spend at most `most` [m/s]."""
     lander, mass = problem.lander, problem.state.mass
@@ -62,7 +69,7 @@ def dual_case(problem: LandingProblem, most: float) -> DualCase:
         np.array(problem.target_velocity),  # copies: kernels compile once for arrays that may be written
         np.array(problem.gravity),
         full,
-        full * (math.expm1(most / exhaust) / most if most > 0.0 else 1.0 / exhaust),
+        full * chord_growth(most, exhaust),
         least,
         least / exhaust,
         math.cos(limit),

@@ -13,18 +13,21 @@ from guidance.descent.dual_bound import DualBound, DualPiece
 from guidance.descent.problem import LandingProblem
 from guidance.flight_time.primer_vector import PrimerFlight
 from guidance.lower_bound.dual_ascent import two_impulse_primer
-from guidance.lower_bound.dual_case import DualCase, dual_case
+from guidance.lower_bound.dual_case import dual_case
 from guidance.lower_bound.dual_function import sweep_bound
-from guidance.lower_bound.time_cover import CoverAim, TimeCover, best_primer, cover_times
+from guidance.lower_bound.time_cover import (
+    GRANTED,
+    CoverAim,
+    TimeCover,
+    best_primer,
+    claimed_bound,
+    cover_times,
+)
+from guidance.lower_bound.time_grid import time_grid
 
-_CELLS = 240  # of the grid of times, up to the time to begin with; as wide up to _UNIFORM of it
-_UNIFORM = 2.5
-_NEAR = np.array([0.02, 0.05, 0.1, 0.2, 0.35, 0.6])  # of a cell: there the least propellant may have a kink
-_STRETCH = 1.03  # ratio of times beyond
+_CELLS = 240  # of the grid of times, up to the time to begin with
 _HAIR = 1e-9  # of one time of flight: the cell whose bound is that of this time
-_LONGEST = 1e4  # times the first: the last one of the grid where gravity is too weak to end it
 _FIRST_SCALE = 1.1  # of a unit primer at the switches: its thrust has to burn somewhere
-_GRANTED = 1e-7  # of the exhaust velocity: 0.1 g of 1200 kg
 _SCOPE = "every time of flight, in continuous time"
 _CAUSES = ("maximum thrust", "propellant")
 GAP_TOLERANCE = 1e-6
@@ -55,7 +58,7 @@ def prove_least_propellant(
         bound = _bound_at(problem, most, time)
         return Certificate(f"time of flight {time:g} s, in continuous time", (), (bound,), bound.propellant)
     aim = CoverAim(most, GAP_TOLERANCE * exhaust, -math.inf)
-    bound = _bound(problem, most, *_cover(problem, most, time, flight, aim))
+    bound = _bound_by_cover(problem, most, *_cover(problem, most, time, flight, aim))
     return Certificate(_SCOPE, (), (bound,), bound.propellant)
 
 
@@ -73,13 +76,31 @@ def prove_no_flight(problem: LandingProblem, time: float) -> Certificate | None:
     return Certificate(f"{_SCOPE}: dual bound on the propellant", (*causes, *_CAUSES), (bound,))
 
 
+def certify_cover(
+    problem: LandingProblem, most: float, times: Array, cover: TimeCover, infeasible: bool = False
+) -> Certificate:
+    """The certificate that a cover makes.
+
+    Args:
+        problem: the landing problem.
+        most: [m/s] it speaks of flights that spend no more.
+        times: [s] grid of times of flight, rising from 0.
+        cover: the primers that bound its cells.
+        infeasible: whether the bound lies above what the tank holds: there is no flight then.
+    """
+    bound = _bound_by_cover(problem, most, times, cover)
+    if infeasible:
+        return Certificate(f"{_SCOPE}: dual bound on the propellant", _CAUSES, (bound,))
+    return Certificate(_SCOPE, (), (bound,), bound.propellant)
+
+
 def _bound_above_tank(problem: LandingProblem, time: float) -> DualBound | None:
     """A bound that no tank pays for; None where there is none."""
     exhaust = problem.lander.exhaust_velocity
     most = exhaust * problem.log_mass_ratio
-    target = most + 2.0 * _GRANTED * exhaust
+    target = most + 2.0 * GRANTED * exhaust
     times, cover = _cover(problem, most, time, None, CoverAim(target, GAP_TOLERANCE * exhaust, target))
-    return _bound(problem, most, times, cover) if cover.level >= target else None
+    return _bound_by_cover(problem, most, times, cover) if cover.level >= target else None
 
 
 def _relaxed(problem: LandingProblem) -> list[tuple[str, LandingProblem]]:
@@ -96,7 +117,7 @@ def _cover(
     problem: LandingProblem, most: float, time: float, flight: PrimerFlight | None, aim: CoverAim
 ) -> tuple[Array, TimeCover]:
     case = dual_case(problem, most)
-    times = _time_grid(case, aim.target * (1.0 + 1e-12), time)
+    times = time_grid(case, aim.target * (1.0 + 1e-12), time, _CELLS)
     start = two_impulse_primer(time, case) if flight is None else _primer_of(flight)
     return times, cover_times(times, case, start, time, aim)
 
@@ -113,23 +134,6 @@ def _bound_at(problem: LandingProblem, most: float, time: float) -> DualBound:
     return DualBound(problem, most, _claim(problem, lowest[-1], most), pieces, time, time)
 
 
-def _time_grid(case: DualCase, target: float, time: float) -> Array:
-    """[s] times of flight from 0 to the one beyond which gravity alone spends `target` [m/s]."""
-    pull = float(np.linalg.norm(case.gravity))
-    longest = _LONGEST * time
-    if pull > 0.0:
-        enough = (target + float(case.gravity @ (case.arrival - case.velocity)) / pull) / pull
-        longest = max(min(longest, enough), time)
-    step, last = time / _CELLS, min(_UNIFORM * time, longest)
-    around = time + step * np.concatenate([-_NEAR, _NEAR])
-    times = np.concatenate([np.arange(0.0, last, step), around[around < last], [last]])
-    if longest > last:
-        count = math.ceil(math.log(longest / last) / math.log(_STRETCH)) + 1
-        times = np.concatenate([times, np.geomspace(last, longest, count)[1:]])
-    times = np.sort(times)
-    return times[np.diff(times, append=math.inf) > 1e-6 * step]
-
-
 def _primer_of(flight: PrimerFlight) -> Array:
     """(a, b) of a flight's primer, shape (6,)."""
     begin, end = flight.primer_times
@@ -137,8 +141,8 @@ def _primer_of(flight: PrimerFlight) -> Array:
     return _FIRST_SCALE * np.concatenate([flight.primer[1] - slope * (flight.time - end), slope])
 
 
-def _bound(problem: LandingProblem, most: float, times: Array, cover: TimeCover) -> DualBound:
-    """What a cover proves."""
+def _bound_by_cover(problem: LandingProblem, most: float, times: Array, cover: TimeCover) -> DualBound:
+    """What a cover of a grid of times [s] proves of the flights that spend at most `most` [m/s]."""
     starts = np.flatnonzero(np.diff(cover.owner, prepend=-1))
     ends = np.append(times[starts[1:]], times[-1])
     pieces = [
@@ -150,5 +154,4 @@ def _bound(problem: LandingProblem, most: float, times: Array, cover: TimeCover)
 
 
 def _claim(problem: LandingProblem, level: float, most: float) -> float:
-    """[m/s] a level less what the checker's own grid may lose; no flight spends less than nothing."""
-    return max(min(level - _GRANTED * problem.lander.exhaust_velocity, most), 0.0)
+    return claimed_bound(level, most, problem.lander.exhaust_velocity)

@@ -22,8 +22,11 @@ _FIRST_STRIDE = 5e-3  # of the time of flight
 _NUDGE = 0.03  # towards the primer of two impulses: one that is best at another time may lie on a kink of D
 _FIRST_SCALE = 1.1  # of the primer of two impulses: longer than one, its thrust burns somewhere
 _STRETCH = 1.7  # of the distance from the best time
+_NEARER = 1.0 - 1e-9  # than another cell: what lies further inside is rounding
 MOST_PRIMERS = 160
 """A cover that needs more is given up as it stands."""
+GRANTED = 1e-7
+"""Of the exhaust velocity, 0.1 g of 1200 kg: what the checker of a bound may lose on a grid of its own."""
 
 
 class CoverAim(NamedTuple):
@@ -56,6 +59,12 @@ class TimeCover(NamedTuple):
     level: float
     best_time: float
     best_value: float
+
+
+@compile_kernel
+def claimed_bound(level: float, most: float, exhaust: float) -> float:
+    """[m/s] what is claimed of a level of which flights that spend at most `most` are spoken; at least 0."""
+    return max(min(level - GRANTED * exhaust, most), 0.0)
 
 
 @compile_kernel
@@ -128,18 +137,23 @@ def _beyond(time: float, best_time: float, again: bool, times: Array) -> float:
 
 
 @compile_kernel
-def _nearest_open_cell(envelope: Array, times: Array, level: float, best_time: float) -> int:
-    """The cell nearest to the best time whose bound lies below the level; -1 where there is none."""
+def nearest_open_cell(envelope: Array, times: Array, level: float, best_time: float) -> int:
+    """The cell nearest to the best time whose bound lies below the level; -1 where there is none.
+
+    Of two that are as near, up to rounding, it is the earlier one.
+    """
     nearest, least = -1, np.inf
     for k in range(envelope.size):
         away = abs(0.5 * (times[k] + times[k + 1]) - best_time)
-        if envelope[k] < level and away < least:
+        if envelope[k] < level and away < _NEARER * least:
             nearest, least = k, away
     return nearest
 
 
 @compile_kernel
-def _join(primer: Array, number: int, times: Array, case: DualCase, envelope: Array, owner: Index) -> None:
+def join_cover(
+    primer: Array, number: int, times: Array, case: DualCase, envelope: Array, owner: Index
+) -> None:
     """Let a primer bound the cells that it bounds best."""
     lowest = np.empty(envelope.size)
     sweep_bound(primer, times, case, lowest)
@@ -167,7 +181,7 @@ def cover_times(times: Array, case: DualCase, start: Array, near: float, aim: Co
     envelope = np.full(cells, -np.inf)
     primers[0], primers[1] = last_primer(case, times[-1]), along_change(case)
     for count in range(2):
-        _join(primers[count], count, times, case, envelope, owner)
+        join_cover(primers[count], count, times, case, envelope, owner)
     level, best_time, best_value = aim.target, near, np.inf
     time, count, cell, again, stride = near, 2, -1, False, 0.0
     known = start
@@ -178,7 +192,7 @@ def cover_times(times: Array, case: DualCase, start: Array, near: float, aim: Co
             best_value, best_time = found.value, time
             level = min(aim.target, best_value - aim.tolerance)
         primers[count] = found.primer
-        _join(found.primer, count, times, case, envelope, owner)
+        join_cover(found.primer, count, times, case, envelope, owner)
         count += 1
         if best_value < aim.floor:
             break
@@ -189,7 +203,7 @@ def cover_times(times: Array, case: DualCase, start: Array, near: float, aim: Co
                 continue
         if again:  # the best primer of this cell is among them: more cannot be had of it
             level = min(level, envelope[cell])
-        cell_before, cell = cell, _nearest_open_cell(envelope, times, level, best_time)
+        cell_before, cell = cell, nearest_open_cell(envelope, times, level, best_time)
         if cell < 0:
             break
         again = cell == cell_before

@@ -1,0 +1,182 @@
+"""`solve_pdg_many`: the least-propellant descents from many starts, or to many targets."""
+
+from __future__ import annotations
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from numpy.typing import ArrayLike
+
+from guidance.arrays import Array
+from guidance.bulk.answers import INFEASIBLE, OPTIMAL, STATUSES, UNDECIDED, Descents
+from guidance.bulk.certified_flight import Finding, Vehicle, answer_start, scale_start, vehicle_of
+from guidance.bulk.sampling import Nodes, no_nodes, sample_extremal, sample_plan, set_thrust
+from guidance.bulk.starts import Starts
+from guidance.constants import MOON_GRAVITY
+from guidance.descent.certificate import Certificate
+from guidance.descent.plan import Plan
+from guidance.flight_time.neighbouring_extremals import new_extremal
+from guidance.kernel import compile_kernel
+from guidance.lander import PAPER_LANDER, Lander
+from guidance.pdg.solve import solve_pdg
+from guidance.state import State
+from guidance.validation import finite_number
+
+_CHUNK = 64  # starts that a thread takes at once
+_FEWEST_NODES = 2
+_INDIRECT = "indirect"
+_OPTIMAL_FOUND, _INFEASIBLE_FOUND = int(Finding.OPTIMAL), int(Finding.INFEASIBLE)
+
+
+class _Rows(NamedTuple):
+    """What is written in place, a row for each start; see `Descents`."""
+
+    status: npt.NDArray[np.int8]
+    propellant: Array
+    time_of_flight: Array
+    lower_bound: Array
+    first_thrust: Array
+    nodes: Nodes
+
+
+@compile_kernel
+def _answer_rows(begin: int, end: int, states: Array, targets: Array, vehicle: Vehicle, rows: _Rows) -> None:
+    """Answer the starts of some rows."""
+    x = new_extremal()
+    for k in range(begin, end):
+        answer, _ = answer_start(states[k], targets[k], vehicle, x, True)
+        rows.lower_bound[k] = answer.lower_bound
+        if answer.finding == _INFEASIBLE_FOUND:
+            rows.status[k] = INFEASIBLE
+        if answer.finding != _OPTIMAL_FOUND:
+            continue
+        rows.status[k] = OPTIMAL
+        rows.propellant[k], rows.time_of_flight[k] = answer.propellant, x.times[2]
+        set_thrust(x, 0.0, vehicle.max_thrust, rows.first_thrust[k])
+        if rows.nodes.time.shape[1] > 0:
+            engine = vehicle.max_thrust, states[k, 6]
+            problem = scale_start(states[k], targets[k], vehicle)
+            sample_extremal(x, problem, engine, targets[k], k, rows.nodes)
+
+
+def solve_pdg_many(
+    states: State | ArrayLike,
+    targets: ArrayLike,
+    *,
+    lander: Lander = PAPER_LANDER,
+    gravity: ArrayLike = MOON_GRAVITY,
+    glide_slope_limit: float | None = None,
+    speed_limit: float | None = None,
+    nodes: int | None = None,
+    fallback: bool = True,
+    threads: int | None = None,
+) -> Descents:
+    """Plan the descents of least propellant from N states to one target, from one to N, or from N to N.
+
+    Compiled code answers the starts whose flight the indirect method finds, within every limit, and proves
+    what no flight undercuts; `solve_pdg` answers the rest, one after another.
+
+    Args:
+        states: State or (x, y, z, vx, vy, vz, mass), shape (7,) or (N, 7).
+        targets: [m] shape (3,) or (N, 3), site frame; no flight goes below its target's altitude.
+        lander: the vehicle. Its pointing limit is measured from the z axis.
+        gravity: [m/s^2] shape (3,).
+        glide_slope_limit: [rad] greatest angle from the z axis, seen from the target, in (0, pi/2].
+        speed_limit: [m/s] greatest speed.
+        nodes: n at least 2, for each flight at n equal steps of its time; None for none.
+        fallback: whether `solve_pdg` is asked where the compiled code has no answer; those starts are else
+            'limit reached': nothing is known of them.
+        threads: that share the work; None for one a core. The answers do not depend on it.
+
+    Returns:
+        A row for each start, in order.
+
+    Raises:
+        ValueError: an argument is out of range, not finite or of the wrong shape, or a start lies below its
+            target's altitude or has no propellant; the first such row is named.
+    """
+    starts = Starts.parse(states, targets, lander, gravity, (glide_slope_limit, speed_limit))
+    rows = _no_rows(len(starts), _node_count(nodes))
+    _answer_all(starts, rows, _thread_count(threads))
+    method = np.full(len(starts), "", "<U8")
+    method[rows.status != UNDECIDED] = _INDIRECT
+    certificates: dict[int, Certificate | None] = {}
+    if fallback:
+        for k in np.flatnonzero(rows.status == UNDECIDED).tolist():
+            plan = _ask(starts, k)
+            _write_plan(plan, k, rows)
+            method[k], certificates[k] = plan.method, plan.certificate
+    return Descents(
+        starts,
+        rows.status,
+        rows.propellant,
+        rows.time_of_flight,
+        rows.lower_bound,
+        rows.first_thrust,
+        method,
+        None if nodes is None else rows.nodes,
+        certificates,
+    )
+
+
+def _no_rows(starts: int, nodes: int) -> _Rows:
+    """Rows to be written."""
+    propellant, time_of_flight, lower_bound = (np.full(starts, np.nan) for _ in range(3))
+    status, first_thrust = np.full(starts, UNDECIDED, np.int8), np.full((starts, 3), np.nan)
+    return _Rows(status, propellant, time_of_flight, lower_bound, first_thrust, no_nodes(starts, nodes))
+
+
+def _node_count(nodes: int | None) -> int:
+    if nodes is None:
+        return 0
+    if isinstance(nodes, bool) or not isinstance(nodes, int | np.integer) or nodes < _FEWEST_NODES:
+        raise ValueError(f"nodes must be an integer of at least {_FEWEST_NODES}, got {nodes!r}")
+    return int(nodes)
+
+
+def _thread_count(threads: int | None) -> int:
+    return os.cpu_count() or 1 if threads is None else int(finite_number("threads", threads, at_least=1))
+
+
+def _answer_all(starts: Starts, rows: _Rows, threads: int) -> None:
+    """Answer every start that compiled code can; the kernel holds no lock, so that threads work at once."""
+    vehicle = vehicle_of(starts.lander, starts.gravity, starts.glide_slope_limit, starts.speed_limit)
+    spans = [(k, min(k + _CHUNK, len(starts))) for k in range(0, len(starts), _CHUNK)]
+
+    def answer(span: tuple[int, int]) -> None:
+        _answer_rows(*span, starts.states, starts.targets, vehicle, rows)
+
+    for span in spans[:1]:
+        answer(span)
+    if min(threads, len(spans)) <= 1:
+        for span in spans[1:]:
+            answer(span)
+        return
+    with ThreadPoolExecutor(min(threads, len(spans))) as pool:
+        list(pool.map(answer, spans[1:]))
+
+
+def _ask(starts: Starts, index: int) -> Plan:
+    return solve_pdg(
+        starts.states[index],
+        starts.targets[index],
+        lander=starts.lander,
+        gravity=starts.gravity,
+        glide_slope_limit=starts.glide_slope_limit,
+        speed_limit=starts.speed_limit,
+        throw=False,
+    )
+
+
+def _write_plan(plan: Plan, row: int, rows: _Rows) -> None:
+    rows.status[row] = STATUSES.index(plan.status)
+    if plan.certificate is not None:
+        rows.lower_bound[row] = plan.certificate.lower_bound
+    if plan.status.has_flight:
+        rows.propellant[row], rows.time_of_flight[row] = plan.propellant, plan.time_of_flight
+        rows.first_thrust[row] = plan.thrust[0]
+        if rows.nodes.time.shape[1] > 0:
+            sample_plan(plan, row, rows.nodes)

@@ -1,0 +1,45 @@
+"""Write the flight code, a C99 file without dependencies, with its test program, into a folder.
+
+python -m guidance.export_c --out DIR
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+from guidance.console import tolerate_encoding
+from guidance.flight_code.export import export_flight_code
+
+
+@dataclass(frozen=True)
+class ExportCommand:
+    """Write the C sources of the least-propellant descent, a program that checks them, and its vectors.
+
+    Attributes:
+        out: Folder; it is made where it is missing.
+        overwrite: Replace files that are there.
+    """
+
+    out: Path
+    overwrite: bool = False
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run the command; exit status 2 where the folder must not or cannot be written."""
+    import tyro
+
+    tolerate_encoding()
+    command = tyro.cli(ExportCommand, args=arguments, prog="python -m guidance.export_c")
+    try:
+        written = export_flight_code(command.out, command.overwrite)
+    except OSError as error:
+        sys.stderr.write(f"error: {error}\n")
+        raise SystemExit(2) from None
+    sys.stdout.write("".join(f"{path}\n" for path in written))
+    sys.stdout.write(f"make -C {command.out} check    # compiles it, and compares it with the vectors\n")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1157 @@
+/*
+ * See powered_descent.h. Functions bear the names of the Python package `guidance` whose sources they follow,
+ * in the same order of operations:
+ *
+ *   flight_time/extremal.py, primer_equations.py    the extremal (Lawden, 1963; Lu, JGCD 41(4), 2018)
+ *   flight_time/path_limits.py                      the limits on its path
+ *   flight_time/neighbouring_extremals.py           extremals of other times of flight
+ *   lower_bound/dual_function.py, time_grid.py, time_cover.py, neighbour_cover.py    the bound
+ *   bulk/certified_flight.py                        the answer
+ *
+ * Compile without contraction of floating-point expressions (-ffp-contract=off) for answers equal to Python's.
+ */
+#include "powered_descent.h"
+
+#include <math.h>
+
+#define POINTS 8         /* of a quadrature */
+#define LEGS 6           /* parts of an arc in a checked path */
+#define NODES (3 * LEGS + 1)
+#define ANGLES 4         /* of the seven numbers of a step: two for each primer; three times follow */
+#define UNKNOWNS 7
+#define FIXED 6          /* unknowns of a given time of flight */
+#define MOST_STEPS 30    /* of Newton's method */
+#define MOST_HALVINGS 12
+#define MOST_PRIMERS 24  /* of a bound */
+#define CELLS 70         /* of the grid of times, up to the best time */
+#define NEAR 6
+#define MOST_TIMES 512   /* 175 even steps, 12 near the best time, 281 stretched ones, and the ends */
+
+static const double PI = 3.14159265358979323846;
+static const double LARGEST_NUMBER = 1e9, ROUNDING = 1e-6;
+static const double CONVERGED = 1e-10, LATEST_FIRST_BURN = 0.5, UNIT = 1e-6, MOST_TURN = 0.5;
+static const double UNIFORM = 2.5, STRETCH = 1.03, LONGEST = 1e4;
+static const double BEYOND = 1.2, GROWTH = 4.0, EARLIEST = 0.1, IMPULSES = 1.02;
+static const double TOLERANCE = 2e-6, GRANTED = 1e-7, CLOSE = 1.0 - 1e-9;
+static const int TRIES = 2;
+static const double NEAR_MARKS[NEAR] = {0.02, 0.05, 0.1, 0.2, 0.35, 0.6};
+static const double QUADRATURE_POINTS[POINTS] = {
+    -0.9602898564975362, -0.7966664774136267,
+    -0.525532409916329, -0.18343464249564978,
+    0.18343464249564978, 0.525532409916329,
+    0.7966664774136267, 0.9602898564975362,
+};
+static const double QUADRATURE_WEIGHTS[POINTS] = {
+    0.10122853629037706, 0.22238103445337443,
+    0.3137066458778869, 0.36268378337836166,
+    0.36268378337836166, 0.3137066458778869,
+    0.22238103445337443, 0.10122853629037706,
+};
+
+typedef struct {
+    double position[3], velocity[3], gravity[3], mass_flow;
+} primer_problem;
+
+typedef struct {
+    double primer[2][3], times[3];
+} extremal;
+
+typedef struct {
+    double begin, end, mass;
+} burn;
+
+typedef struct {
+    double position[NODES][3], velocity[NODES][3], direction[NODES][3];
+} primer_path;
+
+typedef struct {
+    extremal at;
+    double frame[4][3], correction[UNKNOWNS], rate[UNKNOWNS];
+} neighbours;
+
+typedef struct {
+    double position[3], velocity[3], gravity[3], full, full_growth, cosine, sine;
+} dual_case;
+
+typedef struct {
+    double factor, first, second;
+} growth;
+
+typedef struct {
+    int burning;
+    double duration;
+    growth of;
+} arc;
+
+typedef struct {
+    int size;
+    double times[MOST_TIMES];
+} time_grid;
+
+static double least(double a, double b) { return a < b ? a : b; }
+
+static double greatest(double a, double b) { return a > b ? a : b; }
+
+static double dot(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+static double norm(const double *values, int count)
+{
+    double largest = 0.0;
+    for (int k = 0; k < count; k++) {
+        if (isnan(values[k])) {
+            return values[k];
+        }
+        largest = greatest(largest, fabs(values[k]));
+    }
+    return largest;
+}
+
+static int all_finite(const double *values, int count)
+{
+    for (int k = 0; k < count; k++) {
+        if (!isfinite(values[k])) {
+            return 0;
+        }
+    }
+    return 1;
+}
+
+/* ---- the extremal ---------------------------------------------------------------------------------------- */
+
+static void set_primer(const extremal *x, double time, double p[3])
+{
+    double fraction = (time - x->times[0]) / (x->times[1] - x->times[0]);
+    for (int axis = 0; axis < 3; axis++) {
+        p[axis] = x->primer[0][axis] + (x->primer[1][axis] - x->primer[0][axis]) * fraction;
+    }
+}
+
+/* Add to (r, v), at the time `then`, what a burn contributes. */
+static void add_burn(const extremal *x, burn part, double mass_flow, double then, double out[6])
+{
+    double half = 0.5 * (part.end - part.begin), p[3];
+    for (int k = 0; k < POINTS; k++) {
+        double elapsed = half * (1.0 + QUADRATURE_POINTS[k]);
+        set_primer(x, part.begin + elapsed, p);
+        double size = sqrt(dot(p, p));
+        double impulse = half * QUADRATURE_WEIGHTS[k] / ((part.mass - mass_flow * elapsed) * greatest(size, 1e-12));
+        for (int axis = 0; axis < 3; axis++) {
+            double gain = impulse * p[axis];
+            out[3 + axis] += gain;
+            out[axis] += gain * (then - part.begin - elapsed);
+        }
+    }
+}
+
+static void fly_extremal(const extremal *x, const primer_problem *problem, primer_path *path)
+{
+    double first = greatest(x->times[0], 0.0);
+    double ends[4] = {0.0, first, x->times[1], x->times[2]};
+    double state[6], p[3], time = 0.0, mass = 1.0;
+    for (int axis = 0; axis < 3; axis++) {
+        state[axis] = problem->position[axis];
+        state[3 + axis] = problem->velocity[axis];
+    }
+    for (int k = 0; k < NODES; k++) {
+        set_primer(x, time, p);
+        double size = greatest(sqrt(dot(p, p)), 1e-12);
+        for (int axis = 0; axis < 3; axis++) {
+            path->position[k][axis] = state[axis];
+            path->velocity[k][axis] = state[3 + axis];
+            path->direction[k][axis] = p[axis] / size;
+        }
+        int number = k / LEGS, part = k % LEGS;
+        if (number == 3) {
+            break;
+        }
+        double step = (ends[number + 1] - ends[number]) / LEGS;
+        double then = ends[number] + (part + 1) * step;
+        for (int axis = 0; axis < 3; axis++) {
+            state[axis] += state[3 + axis] * step + 0.5 * step * step * problem->gravity[axis];
+            state[3 + axis] += step * problem->gravity[axis];
+        }
+        if (number != 1) {
+            burn leg = {time, then, mass};
+            add_burn(x, leg, problem->mass_flow, then, state);
+            mass -= problem->mass_flow * (then - time);
+        }
+        time = then;
+    }
+}
+
+static void residuals(const extremal *x, const primer_problem *problem, double out[UNKNOWNS])
+{
+    double t1 = x->times[0], t2 = x->times[1], final = x->times[2];
+    double first = greatest(t1, 0.0), here[6] = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0}, hamiltonian = 0.0;
+    const double *r = problem->position, *v = problem->velocity, *g = problem->gravity;
+    if (first > 0.0) {
+        burn begin = {0.0, first, 1.0};
+        add_burn(x, begin, problem->mass_flow, final, here);
+    }
+    for (int axis = 0; axis < 3; axis++) {
+        double q1 = x->primer[0][axis], q2 = x->primer[1][axis];
+        double speed = v[axis] + g[axis] * t2 + here[3 + axis];
+        hamiltonian += q2 * g[axis] * (t2 - t1) - (q2 - q1) * speed;
+    }
+    burn last = {t2, final, 1.0 - problem->mass_flow * first};
+    add_burn(x, last, problem->mass_flow, final, here);
+    for (int axis = 0; axis < 3; axis++) {
+        double fall = g[axis] * final;
+        out[axis] = r[axis] + (v[axis] + 0.5 * fall) * final + here[axis];
+        out[3 + axis] = v[axis] + fall + here[3 + axis];
+    }
+    out[6] = hamiltonian;
+}
+
+static void move_extremal(const extremal *x, double frame[4][3], const double step[UNKNOWNS], extremal *out)
+{
+    for (int k = 0; k < 2; k++) {
+        double size = 0.0;
+        for (int axis = 0; axis < 3; axis++) {
+            double value = x->primer[k][axis];
+            value += frame[2 * k][axis] * step[2 * k] + frame[2 * k + 1][axis] * step[2 * k + 1];
+            out->primer[k][axis] = value;
+            size += value * value;
+        }
+        for (int axis = 0; axis < 3; axis++) {
+            out->primer[k][axis] /= sqrt(size);
+        }
+    }
+    for (int k = 0; k < 3; k++) {
+        out->times[k] = x->times[k] + step[ANGLES + k];
+    }
+}
+
+/* Two unit vectors normal to q1, and two to q2. */
+static void set_frame(const extremal *x, double frame[4][3])
+{
+    for (int k = 0; k < 2; k++) {
+        const double *q = x->primer[k];
+        double first[3];
+        int axis = 0;
+        for (int i = 1; i < 3; i++) {
+            if (fabs(q[i]) < fabs(q[axis])) {
+                axis = i;
+            }
+        }
+        for (int i = 0; i < 3; i++) {
+            first[i] = -q[axis] * q[i];
+        }
+        first[axis] += 1.0;
+        double size = sqrt(dot(first, first));
+        for (int i = 0; i < 3; i++) {
+            first[i] /= size;
+        }
+        for (int i = 0; i < 3; i++) {
+            int j = (i + 1) % 3, h = (i + 2) % 3;
+            frame[2 * k][i] = first[i];
+            frame[2 * k + 1][i] = q[j] * first[h] - q[h] * first[j];
+        }
+    }
+}
+
+/* Whether the times are in order and mass is left. */
+static int admitted(const extremal *x, double mass_flow)
+{
+    double first = greatest(x->times[0], 0.0);
+    return first < x->times[1] && x->times[1] < x->times[2] &&
+           mass_flow * (first + x->times[2] - x->times[1]) < 0.95;
+}
+
+/* Solve in place by elimination with row exchange; 0 where the matrix is singular. */
+static int solve_linear(double matrix[UNKNOWNS][UNKNOWNS], double *vector, int size)
+{
+    for (int k = 0; k < size; k++) {
+        int best = k;
+        for (int i = k + 1; i < size; i++) {
+            if (fabs(matrix[i][k]) > fabs(matrix[best][k])) {
+                best = i;
+            }
+        }
+        if (!(fabs(matrix[best][k]) > 1e-14)) {
+            return 0;
+        }
+        if (best != k) {
+            for (int j = k; j < size; j++) {
+                double kept = matrix[k][j];
+                matrix[k][j] = matrix[best][j];
+                matrix[best][j] = kept;
+            }
+            double kept = vector[k];
+            vector[k] = vector[best];
+            vector[best] = kept;
+        }
+        for (int i = k + 1; i < size; i++) {
+            double factor = matrix[i][k] / matrix[k][k];
+            for (int j = k + 1; j < size; j++) {
+                matrix[i][j] -= factor * matrix[k][j];
+            }
+            vector[i] -= factor * vector[k];
+        }
+    }
+    for (int k = size - 1; k >= 0; k--) {
+        for (int j = k + 1; j < size; j++) {
+            vector[k] -= matrix[k][j] * vector[j];
+        }
+        vector[k] /= matrix[k][k];
+    }
+    return 1;
+}
+
+static void set_jacobian(const extremal *x, const primer_problem *problem, const double here[UNKNOWNS],
+                         double frame[4][3], double jacobian[UNKNOWNS][UNKNOWNS])
+{
+    double there[UNKNOWNS], step[UNKNOWNS] = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
+    extremal trial;
+    set_frame(x, frame);
+    for (int k = 0; k < UNKNOWNS; k++) {
+        step[k] = k == ANGLES && x->times[0] < 0.0 ? -1e-7 : 1e-7; /* one side of the kink at t1 = 0 */
+        move_extremal(x, frame, step, &trial);
+        residuals(&trial, problem, there);
+        for (int i = 0; i < UNKNOWNS; i++) {
+            jacobian[i][k] = (there[i] - here[i]) / step[k];
+        }
+        step[k] = 0.0;
+    }
+}
+
+static double length(const double *values, int count)
+{
+    double total = 0.0;
+    for (int k = 0; k < count; k++) {
+        total += values[k] * values[k];
+    }
+    return sqrt(total);
+}
+
+/* Damped Newton, in place; whether it converged. */
+static int newton(extremal *x, const primer_problem *problem)
+{
+    double frame[4][3], jacobian[UNKNOWNS][UNKNOWNS], here[UNKNOWNS], there[UNKNOWNS], full[UNKNOWNS];
+    double step[UNKNOWNS];
+    extremal trial;
+    if (!admitted(x, problem->mass_flow)) {
+        return 0;
+    }
+    residuals(x, problem, here);
+    for (int iteration = 0; iteration < MOST_STEPS; iteration++) {
+        if (norm(here, UNKNOWNS) < CONVERGED) {
+            return 1;
+        }
+        set_jacobian(x, problem, here, frame, jacobian);
+        for (int k = 0; k < UNKNOWNS; k++) {
+            full[k] = -here[k];
+        }
+        if (!solve_linear(jacobian, full, UNKNOWNS) || !all_finite(full, UNKNOWNS)) {
+            return 0;
+        }
+        double turn = norm(full, ANGLES), delay = norm(full + ANGLES + 1, 2);
+        double damping = least(least(1.0, 0.7 / greatest(1e-9, turn)), 0.5 / greatest(1e-9, delay));
+        double before = length(here, UNKNOWNS);
+        int better = 0;
+        for (int halving = 0; halving < MOST_HALVINGS; halving++) {
+            for (int k = 0; k < UNKNOWNS; k++) {
+                step[k] = damping * full[k];
+            }
+            move_extremal(x, frame, step, &trial);
+            if (admitted(&trial, problem->mass_flow)) {
+                residuals(&trial, problem, there);
+                if (length(there, UNKNOWNS) < (1.0 - 0.1 * damping) * before) {
+                    better = 1;
+                    break;
+                }
+            }
+            damping *= 0.5;
+        }
+        if (!better) {
+            return 0;
+        }
+        *x = trial;
+        for (int k = 0; k < UNKNOWNS; k++) {
+            here[k] = there[k];
+        }
+    }
+    return norm(here, UNKNOWNS) < CONVERGED;
+}
+
+/* First guess: a suicide burn along the vertical, and two sideways impulses, at the start and in it. */
+static int guess(const primer_problem *problem, int first_burn, extremal *x)
+{
+    const double *r = problem->position, *v = problem->velocity;
+    double g = sqrt(dot(problem->gravity, problem->gravity));
+    double up[3], across[3], kick[3], q1[3], q2[3], speed[3];
+    for (int axis = 0; axis < 3; axis++) {
+        up[axis] = -problem->gravity[axis] / g;
+    }
+    double height = dot(r, up), climb = dot(v, up);
+    double coast = (2.0 * (1.0 - g) * height - climb * climb) / 2.0;
+    double ignition_speed = sqrt(greatest(climb * climb + 2.0 * g * coast, 1e-6 * g * fabs(height)));
+    double t2 = greatest((ignition_speed + climb) / g, 1e-2 * ignition_speed / g);
+    double final = t2 + ignition_speed / (1.0 - g);
+    for (int axis = 0; axis < 3; axis++) {
+        across[axis] = (r[axis] - height * up[axis]) / (0.5 * (t2 + final));
+        kick[axis] = -across[axis] - (v[axis] - climb * up[axis]);
+        q2[axis] = across[axis] + (ignition_speed + g * (final - t2)) * up[axis];
+    }
+    double size = sqrt(dot(kick, kick)), q2_size = sqrt(dot(q2, q2));
+    for (int axis = 0; axis < 3; axis++) {
+        q2[axis] /= q2_size;
+    }
+    double t1 = least(t2 - 2.0 * ignition_speed / g, -1e-3 * t2);
+    if (first_burn && size > 1e-9 * ignition_speed) {
+        t1 = size < 0.8 * t2 ? size : LATEST_FIRST_BURN * t2;
+        for (int axis = 0; axis < 3; axis++) {
+            speed[axis] = v[axis] + kick[axis];
+        }
+        double sine = 1.0, cosine = 0.0;
+        for (int k = 0; k < 5; k++) { /* the Hamiltonian at t1 */
+            double gap = dot(speed, up) - g * (t2 - t1);
+            if (gap == 0.0) {
+                break;
+            }
+            cosine = (dot(q2, speed) - sine * dot(kick, speed) / size) / gap;
+            cosine = least(greatest(cosine, -0.95), 0.95);
+            sine = sqrt(1.0 - cosine * cosine);
+        }
+        for (int axis = 0; axis < 3; axis++) {
+            q1[axis] = sine * kick[axis] / size + cosine * up[axis];
+        }
+    } else {
+        for (int axis = 0; axis < 3; axis++) {
+            q1[axis] = 0.1 * kick[axis] / ignition_speed - up[axis];
+        }
+        double q1_size = sqrt(dot(q1, q1));
+        for (int axis = 0; axis < 3; axis++) {
+            q1[axis] /= q1_size;
+        }
+    }
+    for (int axis = 0; axis < 3; axis++) {
+        x->primer[0][axis] = q1[axis];
+        x->primer[1][axis] = q2[axis];
+    }
+    x->times[0] = t1;
+    x->times[1] = t2;
+    x->times[2] = final;
+    return fabs(dot(q1, q1) - 1.0) < UNIT && fabs(dot(q2, q2) - 1.0) < UNIT;
+}
+
+/* The problem with the time of flight as the unit of time. */
+static primer_problem in_units(const primer_problem *problem, double unit)
+{
+    primer_problem out = *problem;
+    for (int axis = 0; axis < 3; axis++) {
+        out.position[axis] /= unit * unit;
+        out.velocity[axis] /= unit;
+    }
+    out.mass_flow *= unit;
+    return out;
+}
+
+static int solve_primer(const primer_problem *problem, extremal *x)
+{
+    for (int attempt = 0; attempt < 2; attempt++) {
+        if (!guess(problem, attempt == 0, x)) {
+            continue;
+        }
+        double unit = x->times[2];
+        primer_problem scaled = in_units(problem, unit);
+        for (int k = 0; k < 3; k++) {
+            x->times[k] /= unit;
+        }
+        if (newton(x, &scaled)) {
+            for (int k = 0; k < 3; k++) {
+                x->times[k] *= unit;
+            }
+            return 1;
+        }
+    }
+    return 0;
+}
+
+static descent_status keeps_limits(const primer_path *path, const descent_vehicle *vehicle, double unit)
+{
+    double largest = 0.0, lowest = INFINITY, fastest = 0.0;
+    double least_cosine = isinf(vehicle->pointing_limit) ? -INFINITY : cos(vehicle->pointing_limit);
+    for (int k = 0; k < NODES; k++) {
+        for (int axis = 0; k < NODES - 1 && axis < 3; axis++) {
+            largest = greatest(largest, fabs(unit * path->position[k][axis]));
+        }
+        fastest = greatest(fastest, dot(path->velocity[k], path->velocity[k]));
+        if (k < NODES - 1) {
+            lowest = least(lowest, unit * path->position[k][2]);
+        }
+        if ((k <= LEGS || k >= 2 * LEGS) && path->direction[k][2] < least_cosine) {
+            return DESCENT_LEANS;
+        }
+    }
+    if (lowest < -1e-6 * largest) {
+        return DESCENT_BELOW_GROUND;
+    }
+    double speed = vehicle->speed_limit / unit;
+    if (fastest > speed * speed) {
+        return DESCENT_TOO_FAST;
+    }
+    if (isinf(vehicle->glide_slope_limit)) {
+        return DESCENT_OPTIMAL;
+    }
+    double cosine = cos(vehicle->glide_slope_limit), sine = sin(vehicle->glide_slope_limit);
+    for (int k = 0; k < NODES - 1; k++) {
+        double across = hypot(unit * path->position[k][0], unit * path->position[k][1]);
+        if (across * cosine > unit * path->position[k][2] * sine) {
+            return DESCENT_OFF_GLIDE_SLOPE;
+        }
+    }
+    return DESCENT_OPTIMAL;
+}
+
+/* ---- neighbouring extremals ------------------------------------------------------------------------------ */
+
+/* Write the step, in seconds, that takes the first six equations to -right; none where they are singular. */
+static void solve_fixed(double jacobian[UNKNOWNS][UNKNOWNS], const double *right, double unit,
+                        double step[UNKNOWNS])
+{
+    double matrix[UNKNOWNS][UNKNOWNS], vector[FIXED];
+    for (int i = 0; i < FIXED; i++) {
+        vector[i] = -right[i];
+        for (int k = 0; k < FIXED; k++) {
+            matrix[i][k] = jacobian[i][k];
+        }
+    }
+    for (int k = 0; k < UNKNOWNS; k++) {
+        step[k] = 0.0;
+    }
+    if (solve_linear(matrix, vector, FIXED) && all_finite(vector, FIXED)) {
+        for (int k = 0; k < FIXED; k++) {
+            step[k] = k < ANGLES ? vector[k] : vector[k] * unit;
+        }
+    }
+}
+
+static void find_neighbours(const extremal *at, const primer_problem *problem, neighbours *out)
+{
+    double unit = at->times[2], here[UNKNOWNS], jacobian[UNKNOWNS][UNKNOWNS], column[UNKNOWNS];
+    primer_problem scaled = in_units(problem, unit);
+    extremal x = *at;
+    for (int k = 0; k < 3; k++) {
+        x.times[k] = at->times[k] / unit;
+    }
+    out->at = *at;
+    residuals(&x, &scaled, here);
+    set_jacobian(&x, &scaled, here, out->frame, jacobian);
+    solve_fixed(jacobian, here, unit, out->correction);
+    for (int k = 0; k < FIXED; k++) {
+        if (!(fabs(out->correction[k]) < (k < ANGLES ? MOST_TURN : MOST_TURN * unit))) {
+            for (int i = 0; i < UNKNOWNS; i++) {
+                out->correction[i] = 0.0;
+            }
+            break;
+        }
+    }
+    for (int i = 0; i < UNKNOWNS; i++) {
+        column[i] = jacobian[i][FIXED];
+    }
+    solve_fixed(jacobian, column, 1.0, out->rate);
+    for (int k = 0; k < ANGLES; k++) {
+        out->rate[k] /= unit;
+    }
+    out->rate[FIXED] = 1.0;
+}
+
+static void set_neighbour(neighbours *known, double time, extremal *out)
+{
+    double step[UNKNOWNS], delay = time - known->at.times[2];
+    for (int k = 0; k < UNKNOWNS; k++) {
+        step[k] = known->correction[k] + known->rate[k] * delay;
+    }
+    move_extremal(&known->at, known->frame, step, out);
+}
+
+/* Let an extremal begin to burn at the start, with the sign of `along` q2; in place, where it can. */
+static void begin_first_burn(extremal *x, double along)
+{
+    double start[3], part = 0.0, square = 0.0;
+    for (int axis = 0; axis < 3; axis++) {
+        double slope = (x->primer[1][axis] - x->primer[0][axis]) / (x->times[1] - x->times[0]);
+        start[axis] = x->primer[1][axis] - slope * x->times[1];
+        part += start[axis] * x->primer[1][axis];
+    }
+    for (int axis = 0; axis < 3; axis++) {
+        start[axis] -= part * x->primer[1][axis];
+        square += start[axis] * start[axis];
+    }
+    if (!(square < 1.0)) {
+        return;
+    }
+    for (int axis = 0; axis < 3; axis++) {
+        x->primer[0][axis] = start[axis] + copysign(sqrt(1.0 - square), along) * x->primer[1][axis];
+    }
+    x->times[0] = 0.0;
+}
+
+static void neighbours_at(neighbours *known, const primer_problem *problem, double time, neighbours *out)
+{
+    double near = known->at.times[2];
+    extremal there, first;
+    set_neighbour(known, time, &there);
+    if (time != near && (known->at.times[0] < 0.0 || there.times[0] < 0.0)) {
+        neighbours short_burn;
+        set_neighbour(known, near, &first);
+        begin_first_burn(&first, time - near);
+        find_neighbours(&first, problem, &short_burn);
+        set_neighbour(&short_burn, time, &there);
+    }
+    find_neighbours(&there, problem, out);
+}
+
+/* ---- the bound ------------------------------------------------------------------------------------------- */
+
+static growth grow(double rate, double time)
+{
+    double x = rate * time;
+    growth out;
+    out.first = fabs(x) < 1e-8 ? time * (1.0 + 0.5 * x) : expm1(x) / rate;
+    if (fabs(x) < 1e-2) {
+        out.second =
+            0.5 * time * time * (1.0 + x / 3.0 * (1.0 + x / 4.0 * (1.0 + x / 5.0 * (1.0 + x / 6.0))));
+    } else {
+        out.second = (out.first - time) / rate;
+    }
+    out.factor = exp(x);
+    return out;
+}
+
+/* Greatest p.d over the directions that the engine may take, tau seconds before the landing. */
+static double support(const double primer[6], double tau, const dual_case *problem)
+{
+    double x = primer[0] + primer[3] * tau, y = primer[1] + primer[4] * tau, z = primer[2] + primer[5] * tau;
+    double across = sqrt(x * x + y * y), size = sqrt(across * across + z * z);
+    return z >= size * problem->cosine ? size : problem->sine * across + problem->cosine * z;
+}
+
+static double linear_part(const double primer[6], double time, const dual_case *problem)
+{
+    double total = 0.0;
+    for (int axis = 0; axis < 3; axis++) {
+        double fall = problem->gravity[axis] * time;
+        total += primer[axis] * (0.0 - problem->velocity[axis] - fall);
+        total -= primer[3 + axis] *
+                 (problem->position[axis] + (problem->velocity[axis] + 0.5 * fall) * time);
+    }
+    return total;
+}
+
+/* Arcs of one step on which h has a constant slope; the second lasts 0 s where s keeps its sign. */
+static void split_step(double s, double slope, double step, const growth whole[2], const dual_case *problem,
+                       arc arcs[2])
+{
+    int burning = s > 0.0 || (s == 0.0 && slope > 0.0);
+    double rate = burning ? problem->full_growth : 0.0;
+    growth of = whole[burning];
+    double end = s * of.factor + slope * of.first;
+    arcs[0].burning = burning;
+    arcs[1].burning = !burning;
+    if ((end >= 0.0) == burning || end == 0.0) {
+        growth none = {1.0, 0.0, 0.0};
+        arcs[0].duration = step;
+        arcs[0].of = of;
+        arcs[1].duration = 0.0;
+        arcs[1].of = none;
+        return;
+    }
+    double ratio = s / slope;
+    double until = rate * fabs(ratio) < 1e-9 ? -ratio : -log1p(rate * ratio) / rate;
+    until = least(greatest(until, 0.0), step);
+    arcs[0].duration = until;
+    arcs[0].of = grow(rate, until);
+    arcs[1].duration = step - until;
+    arcs[1].of = grow(burning ? 0.0 : problem->full_growth, step - until);
+}
+
+/* Raise the envelope, the bound of each cell of the grid, to what a primer bounds. */
+static void join_cover(const double primer[6], const time_grid *grid, const dual_case *problem, double *envelope)
+{
+    const double *times = grid->times;
+    double bend = -(primer[3] * problem->gravity[0] + primer[4] * problem->gravity[1] +
+                    primer[5] * problem->gravity[2]);
+    double here = support(primer, times[0], problem);
+    double s = here - 1.0, spent = 0.0, before = linear_part(primer, times[0], problem);
+    double last = times[1] - times[0];
+    growth whole[2] = {grow(0.0, last), grow(problem->full_growth, last)};
+    for (int k = 0; k < grid->size - 1; k++) {
+        double step = times[k + 1] - times[k];
+        if (fabs(step - last) > 1e-12 * step) {
+            whole[0] = grow(0.0, step);
+            whole[1] = grow(problem->full_growth, step);
+            last = step;
+        }
+        double there = support(primer, times[k + 1], problem), slope = (there - here) / step, lowest = s;
+        arc arcs[2];
+        split_step(s, slope, step, whole, problem, arcs);
+        for (int i = 0; i < 2; i++) {
+            double weight = arcs[i].burning ? problem->full : 0.0;
+            spent += weight * (s * arcs[i].of.first + slope * arcs[i].of.second);
+            s = s * arcs[i].of.factor + slope * arcs[i].of.first;
+        }
+        lowest = least(lowest, s);
+        double after = linear_part(primer, times[k + 1], problem) - spent;
+        double sag = bend + problem->full * greatest(-slope, 0.0) +
+                     problem->full * problem->full_growth * greatest(-lowest, 0.0);
+        double bound = least(before, after) - 0.125 * step * step * greatest(sag, 0.0);
+        if (bound > envelope[k]) {
+            envelope[k] = bound;
+        }
+        before = after;
+        here = there;
+    }
+}
+
+/* The same for a constant primer no longer than one, which lights no engine. */
+static void join_constant(const double primer[6], const time_grid *grid, const dual_case *problem,
+                          double *envelope)
+{
+    double before = linear_part(primer, grid->times[0], problem);
+    for (int k = 0; k < grid->size - 1; k++) {
+        double after = linear_part(primer, grid->times[k + 1], problem);
+        double bound = least(before, after);
+        if (bound > envelope[k]) {
+            envelope[k] = bound;
+        }
+        before = after;
+    }
+}
+
+static void unit_primer(const double along[3], double primer[6])
+{
+    double size = greatest(sqrt(dot(along, along)), 1e-300);
+    for (int axis = 0; axis < 3; axis++) {
+        primer[axis] = along[axis] / size;
+        primer[3 + axis] = 0.0;
+    }
+}
+
+static void two_impulse_primer(double time, const dual_case *problem, double primer[6])
+{
+    double first[3], last[3];
+    for (int axis = 0; axis < 3; axis++) {
+        double fall = problem->gravity[axis] * time;
+        double after = -problem->position[axis] / time - 0.5 * fall;
+        first[axis] = after - problem->velocity[axis];
+        last[axis] = 0.0 - after - fall;
+    }
+    double first_size = greatest(sqrt(dot(first, first)), 1e-300);
+    double last_size = greatest(sqrt(dot(last, last)), 1e-300);
+    for (int axis = 0; axis < 3; axis++) {
+        primer[axis] = last[axis] / last_size;
+        primer[3 + axis] = (first[axis] / first_size - primer[axis]) / time;
+    }
+}
+
+/* Primer of an extremal, of the length that lights the engine where it brakes. */
+static void primer_of(const extremal *x, const dual_case *problem, double primer[6])
+{
+    double time = x->times[2] - x->times[1], rate = problem->full_growth, total = 0.0;
+    for (int axis = 0; axis < 3; axis++) {
+        double slope = (x->primer[0][axis] - x->primer[1][axis]) / (x->times[1] - x->times[0]);
+        primer[axis] = x->primer[1][axis] - slope * time;
+        primer[3 + axis] = slope;
+    }
+    for (int k = 0; k < POINTS; k++) {
+        double tau = 0.5 * time * (1.0 + QUADRATURE_POINTS[k]), square = 0.0;
+        for (int axis = 0; axis < 3; axis++) {
+            double p = primer[axis] + primer[3 + axis] * tau;
+            square += p * p;
+        }
+        total += QUADRATURE_WEIGHTS[k] * exp(-rate * tau) * sqrt(square);
+    }
+    double scale = 1.0 / (exp(-rate * time) + 0.5 * rate * time * total);
+    for (int number = 0; number < 6; number++) {
+        primer[number] *= scale;
+    }
+}
+
+/* Times of flight from 0 to the one beyond which gravity alone spends the target; 0 where they do not fit. */
+static int set_grid(const dual_case *problem, double target, double time, time_grid *grid)
+{
+    double pull = sqrt(dot(problem->gravity, problem->gravity)), longest = LONGEST * time;
+    double change = 0.0;
+    for (int axis = 0; axis < 3; axis++) {
+        change += problem->gravity[axis] * (0.0 - problem->velocity[axis]);
+    }
+    if (pull > 0.0) {
+        longest = greatest(least(longest, (target + change / pull) / pull), time);
+    }
+    double step = time / CELLS, last = least(UNIFORM * time, longest);
+    double even_steps = ceil(last / step);
+    double stretched = longest > last ? ceil(log(longest / last) / log(STRETCH)) : 0.0;
+    if (!(step > 0.0) || !(even_steps + stretched + 2 * NEAR + 1 <= MOST_TIMES)) {
+        return 0;
+    }
+    int even = (int)even_steps, count = (int)stretched, size = 0, kept = 0;
+    double *times = grid->times;
+    for (int k = 0; k < even; k++) {
+        times[size++] = step * k;
+    }
+    for (int k = 0; k < NEAR; k++) {
+        for (int sign = -1; sign <= 1; sign += 2) {
+            double mark = time + sign * step * NEAR_MARKS[k];
+            if (mark < last) {
+                times[size++] = mark;
+            }
+        }
+    }
+    times[size++] = last;
+    double ratio = pow(longest / last, 1.0 / (count > 1 ? count : 1));
+    for (int k = 0; k < count; k++) {
+        times[size++] = k == count - 1 ? longest : last * pow(ratio, k + 1);
+    }
+    for (int k = even; k < size; k++) { /* insertion sort */
+        double value = times[k];
+        int place = k;
+        while (place > 0 && times[place - 1] > value) {
+            times[place] = times[place - 1];
+            place--;
+        }
+        times[place] = value;
+    }
+    for (int k = 0; k < size; k++) {
+        if (k == size - 1 || times[k + 1] - times[k] > 1e-6 * step) {
+            times[kept++] = times[k];
+        }
+    }
+    grid->size = kept;
+    return kept > 1;
+}
+
+static int nearest_open_cell(const double *envelope, const time_grid *grid, double level, double best_time)
+{
+    int nearest = -1;
+    double closest = INFINITY;
+    for (int k = 0; k < grid->size - 1; k++) {
+        double away = fabs(0.5 * (grid->times[k] + grid->times[k + 1]) - best_time);
+        if (envelope[k] < level && away < CLOSE * closest) {
+            nearest = k;
+            closest = away;
+        }
+    }
+    return nearest;
+}
+
+/* The least bound [m/s] over every time of flight, from the primers of neighbouring extremals. */
+static double cover_by_neighbours(const extremal *best, const primer_problem *problem, const time_grid *grid,
+                                  const dual_case *relaxed, double target, double tolerance)
+{
+    double envelope[MOST_TIMES], constant[6], change[6], primer[6], minus[3], best_time = best->times[2];
+    double last_time = grid->times[grid->size - 1];
+    for (int axis = 0; axis < 3; axis++) {
+        minus[axis] = 0.0 - relaxed->velocity[axis];
+    }
+    unit_primer(minus, change);
+    for (int axis = 0; axis < 3; axis++) {
+        minus[axis] = -relaxed->gravity[axis];
+    }
+    unit_primer(minus, constant);
+    if (!(dot(change, relaxed->gravity) > 0.0) &&
+        linear_part(constant, last_time, relaxed) < linear_part(change, last_time, relaxed)) {
+        for (int number = 0; number < 6; number++) {
+            constant[number] = change[number];
+        }
+    }
+    for (int k = 0; k < grid->size - 1; k++) {
+        envelope[k] = -INFINITY;
+    }
+    join_constant(constant, grid, relaxed, envelope);
+    join_constant(change, grid, relaxed, envelope);
+
+    neighbours sides[2], there;
+    extremal x;
+    find_neighbours(best, problem, &sides[0]);
+    sides[1] = sides[0];
+    set_neighbour(&sides[0], best_time, &x);
+    primer_of(&x, relaxed, primer);
+    double level = target - tolerance, farthest[2] = {INFINITY, INFINITY};
+    int tried = -1, tries = 0;
+    for (int count = 2; count < MOST_PRIMERS; count++) {
+        join_cover(primer, grid, relaxed, envelope);
+        if (count == 2) {
+            int before = 0;
+            while (before < grid->size - 2 && grid->times[before + 1] < CLOSE * best_time) {
+                before++;
+            }
+            level = least(level, envelope[before] - tolerance);
+        }
+        int cell = nearest_open_cell(envelope, grid, level, best_time);
+        tries = cell == tried ? tries + 1 : 0;
+        if (cell >= 0 && tries == TRIES) { /* its own primer does not bound it: no other one will */
+            level = envelope[cell];
+            tries = 0;
+            cell = nearest_open_cell(envelope, grid, level, best_time);
+        }
+        if (cell < 0) {
+            break;
+        }
+        double time = 0.5 * (grid->times[cell] + grid->times[cell + 1]);
+        two_impulse_primer(time, relaxed, primer);
+        tried = cell;
+        if (linear_part(primer, time, relaxed) > IMPULSES * level) {
+            continue;
+        }
+        double away = time - best_time;
+        int side = time < best_time ? 0 : 1;
+        if (isinf(farthest[side]) || farthest[side] < BEYOND * fabs(away)) {
+            farthest[side] = least(BEYOND * fabs(away), GROWTH * farthest[side]);
+            time = greatest(best_time + copysign(farthest[side], away), EARLIEST * best_time);
+            tried = -1;
+        }
+        neighbours_at(&sides[side], problem, time, &there);
+        set_neighbour(&there, time, &x);
+        if (x.times[0] < x.times[1] && x.times[1] < x.times[2]) {
+            primer_of(&x, relaxed, primer);
+            sides[side] = there;
+        }
+    }
+    double lowest = linear_part(constant, last_time, relaxed);
+    for (int k = 0; k < grid->size - 1; k++) {
+        lowest = least(lowest, envelope[k]);
+    }
+    return lowest;
+}
+
+/* Bound [m/s] what flights that spend at most `most` spend, as well as `target` asks; -INFINITY for none. */
+static double bound_start(const primer_problem *problem, double unit, const descent_vehicle *vehicle,
+                          const extremal *x, double most, double target)
+{
+    double exhaust = vehicle->exhaust_velocity;
+    double limit = isinf(vehicle->pointing_limit) ? PI : vehicle->pointing_limit;
+    dual_case relaxed;
+    time_grid grid;
+    for (int axis = 0; axis < 3; axis++) {
+        relaxed.position[axis] = unit * problem->position[axis];
+        relaxed.velocity[axis] = unit * problem->velocity[axis];
+        relaxed.gravity[axis] = vehicle->gravity[axis];
+    }
+    relaxed.full = unit;
+    relaxed.full_growth = unit * (most > 0.0 ? expm1(most / exhaust) / most : 1.0 / exhaust);
+    relaxed.cosine = isinf(vehicle->pointing_limit) ? -1.0 : cos(limit);
+    relaxed.sine = limit < PI ? sin(limit) : 0.0;
+    if (!set_grid(&relaxed, target * (1.0 + 1e-12), x->times[2], &grid)) {
+        return -INFINITY;
+    }
+    return cover_by_neighbours(x, problem, &grid, &relaxed, target, TOLERANCE * exhaust);
+}
+
+/* ---- the answer ------------------------------------------------------------------------------------------ */
+
+static int in_range(double limit, double most) { return isinf(limit) ? limit > 0.0 : limit > 0.0 && limit <= most; }
+
+static descent_status check_vehicle(const descent_vehicle *vehicle)
+{
+    double engine[4] = {vehicle->max_thrust, vehicle->min_thrust, vehicle->dry_mass, vehicle->exhaust_velocity};
+    double limits[3] = {vehicle->pointing_limit, vehicle->speed_limit, vehicle->glide_slope_limit};
+    if (!all_finite(engine, 4) || !all_finite(vehicle->gravity, 3) || isnan(norm(limits, 3))) {
+        return DESCENT_NOT_FINITE;
+    }
+    if (norm(vehicle->gravity, 3) > LARGEST_NUMBER) {
+        return DESCENT_TOO_LARGE;
+    }
+    if (!(vehicle->max_thrust > 0.0) || !(vehicle->dry_mass > 0.0) || !(vehicle->exhaust_velocity > 0.0) ||
+        !(vehicle->min_thrust >= 0.0) || vehicle->min_thrust > vehicle->max_thrust ||
+        !in_range(vehicle->pointing_limit, PI) || !in_range(vehicle->speed_limit, INFINITY) ||
+        !in_range(vehicle->glide_slope_limit, 0.5 * PI)) {
+        return DESCENT_BAD_VEHICLE;
+    }
+    return DESCENT_OPTIMAL;
+}
+
+static descent_status check_start(const descent_vehicle *vehicle, const descent_state *state,
+                                  const double target[3])
+{
+    double offset[3];
+    if (!all_finite(state->position, 3) || !all_finite(state->velocity, 3) || !isfinite(state->mass) ||
+        !all_finite(target, 3)) {
+        return DESCENT_NOT_FINITE;
+    }
+    if (norm(state->position, 3) > LARGEST_NUMBER || norm(state->velocity, 3) > LARGEST_NUMBER ||
+        fabs(state->mass) > LARGEST_NUMBER || norm(target, 3) > LARGEST_NUMBER) {
+        return DESCENT_TOO_LARGE;
+    }
+    if (state->mass <= vehicle->dry_mass) {
+        return DESCENT_NO_PROPELLANT;
+    }
+    for (int axis = 0; axis < 3; axis++) {
+        offset[axis] = state->position[axis] - target[axis];
+    }
+    if (offset[2] < 0.0 && -offset[2] > ROUNDING * greatest(1.0, sqrt(dot(offset, offset)))) {
+        return DESCENT_BELOW_TARGET;
+    }
+    return DESCENT_OPTIMAL;
+}
+
+/* The start seen from the target, moved onto a limit that rounding makes it break. */
+static void offset_from(const descent_vehicle *vehicle, const descent_state *state, const double target[3],
+                        double offset[3])
+{
+    double limit = vehicle->glide_slope_limit;
+    for (int axis = 0; axis < 3; axis++) {
+        offset[axis] = state->position[axis] - target[axis];
+    }
+    offset[2] = greatest(offset[2], 0.0);
+    if (limit < 0.5 * PI - 1e-6) {
+        double cosine = cos(limit), sine = sin(limit), across = hypot(offset[0], offset[1]);
+        double outside = cosine * across - sine * offset[2];
+        if (0.0 < outside && outside <= ROUNDING * greatest(1.0, sqrt(dot(offset, offset)))) {
+            offset[0] *= 1.0 - outside * cosine / across;
+            offset[1] *= 1.0 - outside * cosine / across;
+            offset[2] += outside * sine;
+        }
+    }
+}
+
+static descent_status answer_start(const descent_vehicle *vehicle, const descent_state *state,
+                                   const double target[3], descent_flight *flight)
+{
+    double exhaust = vehicle->exhaust_velocity, unit = vehicle->max_thrust / state->mass, offset[3];
+    primer_problem problem;
+    primer_path path;
+    extremal x;
+    if (vehicle->min_thrust > 0.0) {
+        return DESCENT_LEAST_THRUST;
+    }
+    offset_from(vehicle, state, target, offset);
+    for (int axis = 0; axis < 3; axis++) {
+        problem.position[axis] = offset[axis] / unit;
+        problem.velocity[axis] = state->velocity[axis] / unit;
+        problem.gravity[axis] = vehicle->gravity[axis] / unit;
+    }
+    problem.mass_flow = vehicle->max_thrust / exhaust / state->mass;
+    double pull = dot(problem.gravity, problem.gravity);
+    if (!(1e-6 < pull)) {
+        return DESCENT_NO_GRAVITY;
+    }
+    if (!(pull < 0.98)) {
+        return DESCENT_WEAK_ENGINE;
+    }
+    if (!(dot(problem.position, problem.gravity) < 0.0)) {
+        return DESCENT_NOT_ABOVE;
+    }
+    if (!solve_primer(&problem, &x)) {
+        return DESCENT_NO_FLIGHT;
+    }
+    double share = problem.mass_flow * (greatest(x.times[0], 0.0) + x.times[2] - x.times[1]);
+    if (!(share < 1.0)) {
+        return DESCENT_NO_FLIGHT;
+    }
+    double spent = -exhaust * log1p(-share), tank = exhaust * log(state->mass / vehicle->dry_mass);
+    if (spent > tank) {
+        double enough = tank + 2.0 * GRANTED * exhaust;
+        if (bound_start(&problem, unit, vehicle, &x, tank, enough) < enough) {
+            return DESCENT_TANK_TOO_SMALL;
+        }
+        flight->lower_bound = INFINITY;
+        return DESCENT_INFEASIBLE;
+    }
+    fly_extremal(&x, &problem, &path);
+    descent_status kept = keeps_limits(&path, vehicle, unit);
+    if (kept != DESCENT_OPTIMAL) {
+        return kept;
+    }
+    double level = bound_start(&problem, unit, vehicle, &x, spent, spent);
+    double bound = greatest(least(level - GRANTED * exhaust, spent), 0.0);
+    flight->propellant = state->mass * share;
+    flight->time_of_flight = x.times[2];
+    flight->lower_bound = state->mass * -expm1(-bound / exhaust);
+    flight->max_thrust = vehicle->max_thrust;
+    for (int k = 0; k < 2; k++) {
+        for (int axis = 0; axis < 3; axis++) {
+            flight->primer[k][axis] = x.primer[k][axis];
+        }
+        flight->primer_times[k] = x.times[k];
+    }
+    return DESCENT_OPTIMAL;
+}
+
+descent_status descent_solve(const descent_vehicle *vehicle, const descent_state *state, const double target[3],
+                             descent_flight *flight)
+{
+    flight->propellant = flight->time_of_flight = flight->lower_bound = flight->max_thrust = NAN;
+    for (int k = 0; k < 2; k++) {
+        for (int axis = 0; axis < 3; axis++) {
+            flight->primer[k][axis] = NAN;
+        }
+        flight->primer_times[k] = NAN;
+    }
+    flight->status = check_vehicle(vehicle);
+    if (flight->status == DESCENT_OPTIMAL) {
+        flight->status = check_start(vehicle, state, target);
+    }
+    if (flight->status == DESCENT_OPTIMAL) {
+        flight->status = answer_start(vehicle, state, target, flight);
+    }
+    return flight->status;
+}
+
+descent_status descent_thrust(const descent_flight *flight, double time, double thrust[3])
+{
+    extremal x;
+    thrust[0] = thrust[1] = thrust[2] = 0.0;
+    if (flight->status != DESCENT_OPTIMAL || !(time >= 0.0)) {
+        return DESCENT_NO_TIME;
+    }
+    if ((flight->primer_times[0] <= time && time < flight->primer_times[1]) || time > flight->time_of_flight) {
+        return DESCENT_OPTIMAL;
+    }
+    for (int k = 0; k < 2; k++) {
+        for (int axis = 0; axis < 3; axis++) {
+            x.primer[k][axis] = flight->primer[k][axis];
+        }
+        x.times[k] = flight->primer_times[k];
+    }
+    set_primer(&x, time, thrust);
+    double size = greatest(sqrt(dot(thrust, thrust)), 1e-12);
+    for (int axis = 0; axis < 3; axis++) {
+        thrust[axis] *= flight->max_thrust / size;
+    }
+    return DESCENT_OPTIMAL;
+}
+
+const char *descent_words(descent_status status)
+{
+    switch (status) {
+    case DESCENT_OPTIMAL:
+        return "optimal";
+    case DESCENT_INFEASIBLE:
+        return "infeasible: the tank pays for no flight";
+    case DESCENT_NO_FLIGHT:
+        return "no flight found";
+    case DESCENT_TANK_TOO_SMALL:
+        return "the flight found burns more than the tank holds";
+    case DESCENT_LEAST_THRUST:
+        return "the engine cannot stop";
+    case DESCENT_NO_GRAVITY:
+        return "gravity is too weak";
+    case DESCENT_WEAK_ENGINE:
+        return "the engine cannot lift the vehicle";
+    case DESCENT_NOT_ABOVE:
+        return "the start does not lie above the target";
+    case DESCENT_LEANS:
+        return "the flight breaks the pointing limit";
+    case DESCENT_BELOW_GROUND:
+        return "the flight goes below the target's altitude";
+    case DESCENT_TOO_FAST:
+        return "the flight breaks the speed limit";
+    case DESCENT_OFF_GLIDE_SLOPE:
+        return "the flight breaks the glide slope limit";
+    case DESCENT_NOT_FINITE:
+        return "an input is not a finite number";
+    case DESCENT_TOO_LARGE:
+        return "a number is beyond 1e9";
+    case DESCENT_BAD_VEHICLE:
+        return "the vehicle or a limit is out of range";
+    case DESCENT_NO_PROPELLANT:
+        return "the mass does not exceed the dry mass";
+    case DESCENT_BELOW_TARGET:
+        return "the start lies below the target's altitude";
+    case DESCENT_NO_TIME:
+        return "no flight to ask, or a time that is not one";
+    }
+    return "unknown status";
+}

@@ -1,0 +1,194 @@
+"""A bound for every time of flight from an extremal and its neighbours, without a search for the primers.
+
+Any affine primer bounds the velocity change of every time of flight; that of the extremal of a time does so
+tightly near it. The best extremal's primer bounds the best time, those of its neighbours (to first order:
+their errors cost tightness, never truth) the times beside it; far out two impulses do, and constant primers.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from guidance.arrays import Array, Index
+from guidance.flight_time.extremal import Extremal, PrimerProblem
+from guidance.flight_time.neighbouring_extremals import (
+    Neighbours,
+    find_neighbours,
+    neighbours_at,
+    new_extremal,
+    set_neighbour,
+)
+from guidance.kernel import compile_kernel
+from guidance.lower_bound.dual_ascent import two_impulse_primer
+from guidance.lower_bound.dual_case import DualCase
+from guidance.lower_bound.dual_function import linear_part
+from guidance.lower_bound.time_cover import (
+    CoverAim,
+    TimeCover,
+    along_change,
+    cover_times,
+    join_cover,
+    last_primer,
+    nearest_open_cell,
+)
+from guidance.lower_bound.time_grid import time_grid
+
+_POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(8)
+_BEYOND = 1.2  # times the distance from the best time to an open cell: there the next primer is taken
+_GROWTH = 4.0  # of that distance from one primer to the next, at most
+_TRIES = 2  # at a cell's own time, each from the neighbours of the one before
+_BEFORE = 1.0 - 1e-9  # of the best time: a node of the grid lies at it, up to rounding
+_EARLIEST = 0.1  # of the best time
+_IMPULSES = 1.02  # times the level: where two impulses spend so much, their primer is enough
+_CELLS, _FINE_CELLS = 70, 240  # of the grid of times, up to the best time; where the search has to help
+_TOLERANCE, _FINE_TOLERANCE = 2e-6, 1e-6  # of the exhaust velocity: 2.4 g of 1200 kg
+_WEAK = 4e-6  # of the exhaust velocity: a bound so far below the flight is searched for
+MOST_PRIMERS = 24
+"""Of a cover by neighbours, the constant ones included."""
+
+
+@compile_kernel
+def primer_of(x: Extremal, case: DualCase) -> Array:
+    """Primer (a, b), shape (6,), of an extremal, of the length that lights the engine where it brakes.
+
+    The switching function of the dual bound, s = |p| - 1 + r int s with the growth r = f kappa, vanishes
+    theta seconds before the landing where, for a primer of unit length there, the scale is
+
+        1 / (e^{-r theta} + r int_0^theta e^{-r tau} |p(tau)| dtau).
+    """
+    burn, primer = x.times[2] - x.times[1], np.empty(6)
+    for axis in range(3):
+        slope = (x.primer[0, axis] - x.primer[1, axis]) / (x.times[1] - x.times[0])
+        primer[axis], primer[3 + axis] = x.primer[1, axis] - slope * burn, slope
+    rate = case.full_growth
+    total = 0.0
+    for k in range(_POINTS.size):
+        tau, square = 0.5 * burn * (1.0 + _POINTS[k]), 0.0
+        for axis in range(3):
+            p = primer[axis] + primer[3 + axis] * tau
+            square += p * p
+        total += _WEIGHTS[k] * math.exp(-rate * tau) * math.sqrt(square)
+    scale = 1.0 / (math.exp(-rate * burn) + 0.5 * rate * burn * total)
+    for number in range(6):
+        primer[number] *= scale
+    return primer
+
+
+@compile_kernel
+def _join_constant(
+    primer: Array, number: int, times: Array, case: DualCase, envelope: Array, owner: Index
+) -> None:
+    """Let a constant primer no longer than one bound the cells that it bounds best, with no least thrust.
+
+    It lights no engine: its bound is the linear part, a straight line over the times.
+    """
+    before = linear_part(primer, times[0], case)
+    for k in range(envelope.size):
+        after = linear_part(primer, times[k + 1], case)
+        lowest = min(before, after)
+        if lowest > envelope[k]:
+            envelope[k], owner[k] = lowest, number
+        before = after
+
+
+@compile_kernel
+def cover_by_neighbours(
+    best: Neighbours, problem: PrimerProblem, times: Array, case: DualCase, aim: CoverAim
+) -> TimeCover:
+    """Bound every time of the grid by the primers of neighbouring extremals.
+
+    Args:
+        best: the extremal of the best time.
+        problem: its problem, in seconds.
+        times: [s] shape (n + 1,), rising from 0.
+        case: the relaxed problem.
+        aim: what level is enough; the floor does not matter here.
+
+    Returns:
+        The cover; its level is less than the aim's where the neighbours give no better one.
+    """
+    cells, best_time = times.size - 1, best.extremal.times[2]
+    primers, owner = np.empty((MOST_PRIMERS, 6)), np.zeros(cells, np.int64)
+    envelope = np.full(cells, -np.inf)
+    primers[0], primers[1] = last_primer(case, times[-1]), along_change(case)
+    for count in range(2):
+        _join_constant(primers[count], count, times, case, envelope, owner)
+    x, left, right = new_extremal(), best, best
+    set_neighbour(best, best_time, x)
+    primer, level = primer_of(x, case), aim.target - aim.tolerance
+    farthest, tried, tries, best_value = np.full(2, np.inf), -1, 0, aim.target
+    count = 2
+    while count < MOST_PRIMERS:
+        primers[count] = primer
+        join_cover(primer, count, times, case, envelope, owner)
+        if count == 2:
+            best_value = float(envelope[int(np.searchsorted(times, _BEFORE * best_time)) - 1])
+            level = min(level, best_value - aim.tolerance)
+        count += 1
+        cell = nearest_open_cell(envelope, times, level, best_time)
+        tries = tries + 1 if cell == tried else 0
+        if cell >= 0 and tries == _TRIES:  # its own primer does not bound it: no other one will
+            level, tries = float(envelope[cell]), 0
+            cell = nearest_open_cell(envelope, times, level, best_time)
+        if cell < 0:
+            break
+        time = 0.5 * (times[cell] + times[cell + 1])
+        primer, tried = two_impulse_primer(time, case), cell
+        if linear_part(primer, time, case) > _IMPULSES * level:
+            continue
+        away, side = time - best_time, 0 if time < best_time else 1
+        if farthest[side] == np.inf or farthest[side] < _BEYOND * abs(away):
+            farthest[side] = min(_BEYOND * abs(away), _GROWTH * farthest[side])
+            time, tried = max(best_time + math.copysign(farthest[side], away), _EARLIEST * best_time), -1
+        there = neighbours_at(left if side == 0 else right, problem, time)
+        set_neighbour(there, time, x)
+        if x.times[0] < x.times[1] < x.times[2]:
+            primer = primer_of(x, case)
+            if side == 0:
+                left = there
+            else:
+                right = there
+    lowest = min(float(np.min(envelope)), linear_part(primers[0], times[-1], case))
+    return TimeCover(primers[:count].copy(), owner, lowest, best_time, best_value)
+
+
+@compile_kernel
+def bound_by_neighbours(
+    x: Extremal, problem: PrimerProblem, case: DualCase, target: float, exhaust: float
+) -> tuple[Array, TimeCover]:
+    """What neighbours alone prove; arguments and answer as of `bound_extremal`."""
+    aim = CoverAim(target, _TOLERANCE * exhaust, -np.inf)
+    times = time_grid(case, target * (1.0 + 1e-12), x.times[2], _CELLS)
+    return times, cover_by_neighbours(find_neighbours(x, problem), problem, times, case, aim)
+
+
+@compile_kernel
+def bound_extremal(
+    x: Extremal, problem: PrimerProblem, case: DualCase, target: float, exhaust: float
+) -> tuple[Array, TimeCover]:
+    """Bound the velocity change of every time of flight, from the extremal of the best time.
+
+    Where its neighbours leave the bound weak, the best primers are searched for.
+
+    Args:
+        x: the extremal, in seconds.
+        problem: its problem, in seconds.
+        case: the relaxed problem.
+        target: [m/s] the level that is enough.
+        exhaust: [m/s] exhaust velocity.
+
+    Returns:
+        [s] The grid of times, and the cover of its cells.
+    """
+    times, cover = bound_by_neighbours(x, problem, case, target, exhaust)
+    if cover.level >= target - _WEAK * exhaust:
+        return times, cover
+    fine = time_grid(case, target * (1.0 + 1e-12), x.times[2], _FINE_CELLS)
+    searched = cover_times(
+        fine, case, primer_of(x, case), x.times[2], CoverAim(target, _FINE_TOLERANCE * exhaust, -np.inf)
+    )
+    if searched.level > cover.level:
+        return fine, searched
+    return times, cover
