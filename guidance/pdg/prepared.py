@@ -1,4 +1,4 @@
-"""`solve_pdg` with its compiled code loaded: importing this plans a descent, so that no first call waits for it.
+"""`solve_pdg`, with its compiled code loaded: importing this plans a descent, so that no first call waits.
 
 `guidance.solve_pdg` comes from here; the package itself is imported without it.
 """
