@@ -189,6 +189,8 @@ def bound_start(problem: PrimerProblem, vehicle: Vehicle, x: Extremal, aim: Boun
         0.0,
         max(vehicle.limits.least_cosine, -1.0),
         vehicle.sine,
+        0.0,
+        0.0,  # no limit on the path: its flight keeps them
     )
     if aim.search:
         times, cover = bound_extremal(x, problem, case, aim.target, exhaust)

@@ -128,8 +128,9 @@ class Plan:
     def optimality_gap(self) -> float:
         """[kg] what the plan burns above the proved lower bound; nan without a flight or a bound.
 
-        The bound leaves out the limits on the path (altitude, glide slope, speed): where they bind, the gap
-        holds their price too. `certificate.scope` says which times of flight it covers.
+        The bound uses the altitude and the glide slope at one time of each flight, and leaves out the speed
+        limit: where these bind for longer, the gap holds a part of their price too. `certificate.scope` says
+        which times of flight it covers.
         """
         if self.status is not PlanStatus.OPTIMAL or self.certificate is None:
             return float("nan")

@@ -88,6 +88,18 @@ class Trajectory:
         velocity = self.velocity[k] + now * s + rise * s**2 / 2.0
         return position, velocity
 
+    def mass_at(self, time: Array) -> Array:
+        """Mass, exact for the hold where the thrust keeps its direction.
+
+        Args:
+            time: [s] shape (k,), from 0 to the end.
+
+        Returns:
+            [kg] shape (k,).
+        """
+        k, fraction = self._place(np.asarray(time, dtype=np.float64))
+        return self._mass_between(k, fraction)
+
     def sample_thrust(self, parts: int) -> Array:
         """Thrust at the ends of equal parts of each interval, from within it where the thrust jumps.
 
@@ -103,12 +115,16 @@ class Trajectory:
 
     def _thrust_within(self, time: Array) -> Array:
         """[N] thrust at times between the start and the end, shape (..., 3)."""
-        at = np.clip(time / self.time[1], 0.0, self.nodes - 1.0)
-        k = np.minimum(at.astype(np.int64), self.nodes - 2)
-        fraction = at - k
+        k, fraction = self._place(time)
         mass = self._mass_between(k, fraction)
         weight = fraction[..., None]
         return mass[..., None] * ((1.0 - weight) * self.acceleration[k] + weight * self.acceleration[k + 1])
+
+    def _place(self, time: Array) -> tuple[Index, Array]:
+        """Interval of each time, and the share of it that has passed."""
+        at = np.clip(time / self.time[1], 0.0, self.nodes - 1.0)
+        k = np.minimum(at.astype(np.int64), self.nodes - 2)
+        return k, at - k
 
     @cached_property
     def acceleration(self) -> Array:

@@ -41,6 +41,12 @@ class PrimerTrajectory(Trajectory):
         states = _states(self.flight.extremal, problem, np.array(time, dtype=np.float64))
         return self.position[0] + scale * states[:, :3], scale * states[:, 3:6]
 
+    def mass_at(self, time: Array) -> Array:
+        """[kg] shape (k,), exact; as `Trajectory.mass_at`."""
+        flight, times = self.flight, np.asarray(time, dtype=np.float64)
+        burning = np.minimum(times, flight.first_burn) + np.maximum(times - flight.braking, 0.0)
+        return self.mass[0] * (1.0 - flight.burn_rate * burning)
+
     def sample_thrust(self, parts: int) -> Array:
         """[N] thrust within the intervals, shape (N - 1, parts + 1, 3); as `Trajectory.sample_thrust`."""
         out = np.empty((self.nodes - 1, parts + 1, 3))
@@ -137,8 +143,8 @@ def _sample(x: Extremal, max_thrust: float, times: Array, out: Array) -> None:
 
 
 @compile_kernel
-def _advance(x: Extremal, problem: PrimerProblem, begin: float, end: float, state: Array) -> None:
-    """Take position, velocity and mass, shape (7,), from one time to a later one."""
+def advance_extremal(x: Extremal, problem: PrimerProblem, begin: float, end: float, state: Array) -> None:
+    """Take position, velocity and mass, shape (7,) in the units of `PrimerProblem`, to a later time."""
     step = end - begin
     for axis in range(3):
         fall = problem.gravity[axis] * step
@@ -163,6 +169,6 @@ def _states(x: Extremal, problem: PrimerProblem, times: Array) -> Array:
         if times[k] < time:  # times need not rise
             state[:3], state[3:6] = problem.position, problem.velocity
             state[6], time = 1.0, 0.0
-        _advance(x, problem, time, times[k], state)
+        advance_extremal(x, problem, time, times[k], state)
         out[k], time = state, times[k]
     return out

@@ -14,7 +14,7 @@ from guidance.descent.problem import LandingProblem
 from guidance.flight_time.primer_vector import PrimerFlight
 from guidance.lower_bound.dual_ascent import two_impulse_primer
 from guidance.lower_bound.dual_case import dual_case
-from guidance.lower_bound.dual_function import sweep_bound
+from guidance.lower_bound.dual_function import AFFINE, THETA
 from guidance.lower_bound.time_cover import (
     GRANTED,
     CoverAim,
@@ -22,6 +22,7 @@ from guidance.lower_bound.time_cover import (
     best_primer,
     claimed_bound,
     cover_times,
+    sweep_cells,
 )
 from guidance.lower_bound.time_grid import time_grid
 
@@ -43,7 +44,8 @@ def prove_least_propellant(
 ) -> Certificate:
     """Bound what any flight of a landing burns, in continuous time and over all times of flight.
 
-    The bound is tight (a few grams of the paper's 25 kg) where no limit on the path binds.
+    The bound is tight (a few grams of the paper's 25 kg) where no limit on the path binds, and where the
+    altitude or the glide slope binds at one time.
 
     Args:
         problem: the landing problem.
@@ -73,6 +75,8 @@ def prove_no_flight(problem: LandingProblem, time: float) -> Certificate | None:
     if bound is None:
         return None
     causes = [name for name, without in _relaxed(problem) if _bound_above_tank(without, time) is None]
+    if any(piece.path_multiplier.any() for piece in bound.pieces):
+        causes.append("glide slope" if problem.has_glide_slope else "altitude")
     return Certificate(f"{_SCOPE}: dual bound on the propellant", (*causes, *_CAUSES), (bound,))
 
 
@@ -129,8 +133,8 @@ def _bound_at(problem: LandingProblem, most: float, time: float) -> DualBound:
     found = best_primer(two_impulse_primer(time, case), time, case, aim)
     times = np.append(np.linspace(0.0, time, _CELLS + 1)[:-1], [time * (1.0 - _HAIR), time])
     lowest = np.empty(times.size - 1)
-    sweep_bound(found.primer, times, case, lowest)
-    pieces = (DualPiece(time, time, found.primer),)
+    sweep_cells(found.primer, times, case, lowest)
+    pieces = (_piece(time, time, found.primer),)
     return DualBound(problem, most, _claim(problem, lowest[-1], most), pieces, time, time)
 
 
@@ -141,15 +145,22 @@ def _primer_of(flight: PrimerFlight) -> Array:
     return _FIRST_SCALE * np.concatenate([flight.primer[1] - slope * (flight.time - end), slope])
 
 
+def _piece(begin: float, end: float, primer: Array) -> DualPiece:
+    """A primer, shape (6,) or (10,), for a span of times of flight [s]."""
+    if primer.size == AFFINE or not primer[AFFINE:THETA].any():
+        return DualPiece(begin, end, primer[:AFFINE])
+    return DualPiece(begin, end, primer[:AFFINE], primer[AFFINE:THETA], float(primer[THETA]))
+
+
 def _bound_by_cover(problem: LandingProblem, most: float, times: Array, cover: TimeCover) -> DualBound:
     """What a cover of a grid of times [s] proves of the flights that spend at most `most` [m/s]."""
     starts = np.flatnonzero(np.diff(cover.owner, prepend=-1))
     ends = np.append(times[starts[1:]], times[-1])
     pieces = [
-        DualPiece(float(times[first]), float(end), cover.primers[cover.owner[first]])
+        _piece(float(times[first]), float(end), cover.primers[cover.owner[first]])
         for first, end in zip(starts, ends, strict=True)
     ]
-    pieces.append(DualPiece(float(times[-1]), math.inf, cover.primers[0]))
+    pieces.append(_piece(float(times[-1]), math.inf, cover.primers[0]))
     return DualBound(problem, most, _claim(problem, cover.level, most), tuple(pieces))
 
 
