@@ -24,6 +24,7 @@ PACKAGES = ("guidance", "hda", "rl", "studies")
 SMALL = ["--episodes", "2", "--workers", "1"]
 
 RUNS: dict[str, tuple[list[str], list[str]]] = {
+    "guidance.export_c": (["--out", "code"], ["code/powered_descent.c", "code/vectors.csv"]),
     "guidance.pdg": (
         ["--state", "100", "0", "900", "0", "0", "-30", "1200", "--plot", "plan.png"],
         ["plan.png"],

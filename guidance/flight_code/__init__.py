@@ -2,8 +2,7 @@
 
 `powered_descent.c` and its header stand here as data of the package, with the program that checks a build of
 them, a Makefile and a README. `reference` is what the C code must answer, by the kernels of Python; `vectors`
-draws examples of it; `export` writes all of it into a folder, as `python -m guidance.export_c` does. Nothing
-but that command imports this wing.
+draws examples of it. `guidance.export_c` imports this wing, and writes all of it into a folder.
 """
 
 from typing import TYPE_CHECKING
@@ -11,12 +10,10 @@ from typing import TYPE_CHECKING
 from guidance.exports import lazy_exports
 
 if TYPE_CHECKING:
-    from guidance.flight_code.export import export_flight_code
     from guidance.flight_code.reference import CodeAnswer, CodeStatus, Question, answer_question
     from guidance.flight_code.vectors import draw_questions
 
 _HOMES = {
-    "guidance.flight_code.export": ("export_flight_code",),
     "guidance.flight_code.reference": (
         "CodeAnswer",
         "CodeStatus",
@@ -32,7 +29,6 @@ __all__ = [
     "Question",
     "answer_question",
     "draw_questions",
-    "export_flight_code",
 ]
 
 __getattr__, __dir__ = lazy_exports(

@@ -1,7 +1,7 @@
 /*
  * Least-propellant powered descent: the flight of the indirect method, and a proved lower bound on the
  * propellant of every flight. C99, <math.h> alone; doubles; no heap, no globals that change, every loop
- * bounded; about 24 kB of stack. SI units; frame: x east, y north, z up.
+ * bounded; less than 20 kB of stack. SI units; frame: x east, y north, z up.
  *
  * The flight burns at full thrust, coasts, and burns at full thrust. It is the best one under constant gravity
  * where the engine can stop and no limit on the path binds; a flight that breaks a limit is refused, and its

@@ -116,10 +116,9 @@ def _refuse_vehicle(question: Question) -> Refusal | None:
         return Refusal.TOO_LARGE
     sizes = min(most_thrust, dry_mass, exhaust) > 0.0 and 0.0 <= least_thrust <= most_thrust
     most = (math.pi, math.inf, math.pi / 2)
-    known = all(
-        limit > 0.0 and (limit <= top or math.isinf(limit)) for limit, top in zip(limits, most, strict=True)
-    )
-    return None if sizes and known else Refusal.BAD_VEHICLE
+    pairs = zip(limits, most, strict=True)
+    known = [limit > 0.0 and (limit <= top or math.isinf(limit)) for limit, top in pairs]
+    return None if sizes and all(known) else Refusal.BAD_VEHICLE
 
 
 def _refuse_start(question: Question) -> Refusal | None:

@@ -49,6 +49,26 @@ def wrong_questions() -> list[Question]:
     return out
 
 
+def edge_questions() -> list[Question]:
+    """Questions outside the method's domain, and flights that break a limit by a little, or by nothing."""
+    low, level = (200.0, 100.0, 50.0, 0.0, 0.0, 0.0, 1200.0), (120.0, 0.0, 50.0, 0.0, 0.0, 30.0, 1200.0)
+    return [
+        _GOOD._replace(min_thrust=500.0),
+        _GOOD._replace(max_thrust=1900.0),
+        _GOOD._replace(gravity=(0.0, 0.0, -1e-3)),
+        _GOOD._replace(gravity=(0.0, 0.0, 1.62)),
+        _GOOD._replace(state=low),
+        _GOOD._replace(state=level),
+        _GOOD._replace(state=level, gravity=(0.8, 0.0, -1.4)),
+        _GOOD._replace(state=(*_GOOD.state[:6], 1170.0)),
+        _GOOD._replace(dry_mass=1176.0),
+        _GOOD._replace(dry_mass=1174.9),
+        *(_GOOD._replace(pointing_limit=angle) for angle in (0.2, 0.9, 1.5, math.pi)),
+        *(_GOOD._replace(speed_limit=speed) for speed in (40.0, 60.0, 80.0)),
+        *(_GOOD._replace(glide_slope_limit=angle) for angle in (0.1, 0.24, 0.4, math.pi / 2)),
+    ]
+
+
 def write_table(questions: list[Question]) -> str:
     """Questions and answers as comma-separated values, a row each, numbers to the last digit."""
     rows = [",".join(map(repr, _numbers(question, answer_question(question)))) for question in questions]

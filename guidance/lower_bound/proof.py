@@ -15,6 +15,7 @@ from guidance.flight_time.primer_vector import PrimerFlight
 from guidance.lower_bound.dual_ascent import two_impulse_primer
 from guidance.lower_bound.dual_case import dual_case
 from guidance.lower_bound.dual_function import AFFINE, THETA
+from guidance.lower_bound.neighbour_cover import primer_of
 from guidance.lower_bound.time_cover import (
     GRANTED,
     CoverAim,
@@ -28,7 +29,6 @@ from guidance.lower_bound.time_grid import time_grid
 
 _CELLS = 240  # of the grid of times, up to the time to begin with
 _HAIR = 1e-9  # of one time of flight: the cell whose bound is that of this time
-_FIRST_SCALE = 1.1  # of a unit primer at the switches: its thrust has to burn somewhere
 _SCOPE = "every time of flight, in continuous time"
 _CAUSES = ("maximum thrust", "propellant")
 GAP_TOLERANCE = 1e-6
@@ -122,7 +122,7 @@ def _cover(
 ) -> tuple[Array, TimeCover]:
     case = dual_case(problem, most)
     times = time_grid(case, aim.target * (1.0 + 1e-12), time, _CELLS)
-    start = two_impulse_primer(time, case) if flight is None else _primer_of(flight)
+    start = two_impulse_primer(time, case) if flight is None else primer_of(flight.extremal, case)
     return times, cover_times(times, case, start, time, aim)
 
 
@@ -136,13 +136,6 @@ def _bound_at(problem: LandingProblem, most: float, time: float) -> DualBound:
     sweep_cells(found.primer, times, case, lowest)
     pieces = (_piece(time, time, found.primer),)
     return DualBound(problem, most, _claim(problem, lowest[-1], most), pieces, time, time)
-
-
-def _primer_of(flight: PrimerFlight) -> Array:
-    """(a, b) of a flight's primer, shape (6,)."""
-    begin, end = flight.primer_times
-    slope = (flight.primer[0] - flight.primer[1]) / (end - begin)
-    return _FIRST_SCALE * np.concatenate([flight.primer[1] - slope * (flight.time - end), slope])
 
 
 def _piece(begin: float, end: float, primer: Array) -> DualPiece:

@@ -52,7 +52,7 @@ def test_nodes_are_those_of_another_integrator(sampler):
 
 def test_a_plan_is_sampled_between_its_nodes():
     """On the nodes of a twice finer plan of the same thrust: position and velocity are exact there."""
-    plan = solve_pdg(paper_start(np.random.default_rng(42)), TARGET, nodes=31)
+    plan = solve_pdg(paper_start(np.random.default_rng(42)), TARGET, nodes=31, method="convex")
     nodes = no_nodes(1, 61)
     sample_plan(plan, 0, nodes)
     assert np.array_equal(nodes.time[0, ::2], np.linspace(0.0, plan.time_of_flight, 61)[::2])

@@ -1,7 +1,4 @@
-"""Write the flight code, a C99 file without dependencies, with its test program, into a folder.
-
-python -m guidance.export_c --out DIR
-"""
+"""Command line of `python -m guidance.export_c`."""
 
 from __future__ import annotations
 
@@ -10,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from guidance.console import tolerate_encoding
-from guidance.flight_code.export import export_flight_code
+from guidance.export_c.export import export_flight_code
 
 
 @dataclass(frozen=True)

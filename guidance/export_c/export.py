@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from guidance.flight_code.vectors import draw_questions, write_table, wrong_questions
+from guidance.flight_code.vectors import draw_questions, edge_questions, write_table, wrong_questions
 
 SOURCES = ("powered_descent.c", "powered_descent.h", "check_vectors.c", "Makefile", "README.md")
 VECTORS = "vectors.csv"
@@ -32,7 +32,8 @@ def export_flight_code(out: Path, overwrite: bool = False) -> list[Path]:
     there = [name for name in (*SOURCES, VECTORS) if (out / name).exists()]
     if there and not overwrite:
         raise FileExistsError(f"{out} holds {', '.join(there)} already; --overwrite replaces them")
-    texts[VECTORS] = write_table(draw_questions(_COUNT, np.random.default_rng(_SEED)) + wrong_questions())
+    drawn = draw_questions(_COUNT, np.random.default_rng(_SEED))
+    texts[VECTORS] = write_table([*drawn, *edge_questions(), *wrong_questions()])
     out.mkdir(parents=True, exist_ok=True)
     written = []
     for name, text in texts.items():
