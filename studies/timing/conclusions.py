@@ -109,8 +109,8 @@ def _qoco_against_clarabel(
             f"{found.ratio:.2f} times as long as Clarabel ({found.paired:.2f} case by case). Of "
             f"{ours.feasible} feasible calls it solves {theirs.solved} within every limit, Clarabel "
             f"{ours.solved}; their plans are at most {1e3 * _apart(calls, qoco, clarabel):.2g} g apart. "
-            f"Infeasible ones end for QOCO, which certifies none, as: {told} (a tank that does not suffice is "
-            f"seen in a flight, without the solver's word); Clarabel refuses {ours.refused} of "
+            f"Infeasible ones end for QOCO, which certifies none, as: {told} (a tank that does not suffice "
+            f"is seen in a flight, without the solver's word); Clarabel refuses {ours.refused} of "
             f"{ours.infeasible}."
         )
     return words or ["QOCO is not installed (extra `peers`): no comparison with it was made."]

@@ -207,7 +207,7 @@ def test_study_writes_its_folder(tmp_path, monkeypatch, capsys, present: bool) -
         monkeypatch.setattr(importlib.util, "find_spec", lambda _name: None)
     chosen = [m for m in timed_methods() if m.name in (OWN_METHOD, PEER_METHOD) and m.nodes <= 31]
     assert [m.name for m in chosen].count(PEER_METHOD) == (2 if present else 0)
-    monkeypatch.setattr(timing, "timed_methods", lambda _openscvx: chosen)
+    monkeypatch.setattr(timing, "timed_methods", lambda _openscvx=None: chosen)
     cases = tmp_path / "cases.json"
     listed = json.loads(timing._CASES.read_text())["cases"]
     cases.write_text(json.dumps({"cases": [listed[0], listed[-1]]}))
@@ -232,7 +232,7 @@ def test_study_writes_its_folder(tmp_path, monkeypatch, capsys, present: bool) -
 def quick(tmp_path, monkeypatch) -> Timing:
     """Two reference cases, one of them infeasible, and a start, by solve_pdg at 31 nodes alone."""
     chosen = [m for m in timed_methods() if m.name == OWN_METHOD and m.nodes == 31]
-    monkeypatch.setattr(timing, "timed_methods", lambda _openscvx: chosen)
+    monkeypatch.setattr(timing, "timed_methods", lambda _openscvx=None: chosen)
     cases = tmp_path / "cases.json"
     listed = json.loads(timing._CASES.read_text())["cases"]
     cases.write_text(json.dumps({"cases": [listed[0], listed[-1]]}))
