@@ -273,7 +273,7 @@ def test_the_worker_says_what_it_lacks() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("time_of_flight", [None, 31.0])
 def test_openscvx_comes_near_the_optimum(time_of_flight: float | None) -> None:
-    start = problem()
+    start = problem(state=State.parse([-161.0, 143.0, 954.0, 0.1, -5.1, -24.9, 1200.0]))
     own = solve_pdg(start.state, start.target, gravity=GRAVITY, nodes=201, time_of_flight=time_of_flight)
     with open_openscvx(HERE) as planner:
         plan = planner.plan(start, 30, time_of_flight)
