@@ -8,6 +8,7 @@ other jobs on the machine disturb, are written beside it.
 
 from __future__ import annotations
 
+import sys
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -30,6 +31,8 @@ from studies.timing.conclusions import conclude
 from studies.timing.gfold_peer import PEER_METHOD, gfold_present
 from studies.timing.measures import Call, Summary, measure_calls, name_processor, summarize_calls
 from studies.timing.methods import Case, paper_cases, reference_cases, timed_methods
+from studies.timing.openscvx_peer import OPENSCVX_PACKAGE, open_openscvx, openscvx_version
+from studies.timing.qoco_peer import QOCO_PACKAGE, qoco_present
 from studies.timing.table import CALL_COLUMNS, SUMMARY_COLUMNS
 
 _WING = Path(__file__).parent
@@ -46,6 +49,7 @@ class Timing(FolderOptions):
         preset: the setting they are drawn from.
         cases: JSON file of reference cases.
         repeats: calls per case and method; all of them count.
+        openscvx_python: interpreter of an environment that has OpenSCvx; this one by default.
         figures: draw the figure.
     """
 
@@ -53,6 +57,7 @@ class Timing(FolderOptions):
     preset: str = "paper"
     cases: Path = _CASES
     repeats: int = 1
+    openscvx_python: Path | None = None
     figures: bool = True
     out: Path = Path("results/timing")
 
@@ -62,7 +67,25 @@ class Timing(FolderOptions):
         finite_number("repeats", self.repeats, at_least=1)
 
 
-def identify_timing(options: Timing) -> dict[str, Any]:
+def find_peers(options: Timing) -> dict[str, str | None]:
+    """Version of each peer package; None where it is not installed.
+
+    Raises:
+        ValueError: the interpreter that the user names has no OpenSCvx.
+        OSError: there is no such interpreter.
+    """
+    named = options.openscvx_python
+    openscvx = openscvx_version(named or Path(sys.executable))
+    if named is not None and openscvx is None:
+        raise ValueError(f"openscvx_python: {named} has no {OPENSCVX_PACKAGE}")
+    return {
+        PEER_METHOD: version(PEER_METHOD) if gfold_present() else None,
+        QOCO_PACKAGE: version(QOCO_PACKAGE) if qoco_present() else None,
+        OPENSCVX_PACKAGE: openscvx,
+    }
+
+
+def identify_timing(options: Timing, peers: dict[str, str | None]) -> dict[str, Any]:
     """All that decides what a call is: how many are made does not.
 
     Raises:
@@ -71,7 +94,7 @@ def identify_timing(options: Timing) -> dict[str, Any]:
     decided = {
         "preset": options.preset,
         "cases": sha256(options.cases.read_bytes()).hexdigest()[:16],
-        "peers": {PEER_METHOD: version(PEER_METHOD) if gfold_present() else None},
+        "peers": peers,
         "processor": name_processor(),
     }
     return identify_run(_WING, decided)
@@ -99,11 +122,15 @@ def study_timing(options: Timing) -> list[Summary]:
         OSError: the cases cannot be read or the folder cannot be written.
     """
     out, console = open_folder(options.out), Console()
-    methods = timed_methods()
-    if not gfold_present():
-        console.print("gfold is not installed: the study runs without it (extra `peers`)", style="yellow")
-    identity = identify_timing(options)
-    with open_journal(out, Call, _PRODUCTS, identity, options.existing) as journal:
+    peers = find_peers(options)
+    for name in [name for name, found in peers.items() if found is None]:
+        console.print(f"{name} is not installed: the study runs without it (extra `peers`)", style="yellow")
+    identity = identify_timing(options, peers)
+    with (
+        open_journal(out, Call, _PRODUCTS, identity, options.existing) as journal,
+        open_openscvx(options.openscvx_python or Path(sys.executable)) as openscvx,
+    ):
+        methods = timed_methods(openscvx if peers[OPENSCVX_PACKAGE] else None)
         cases = list_cases(options)
         calls = measure_calls(methods, cases, options.repeats, journal)
         summaries = [summarize_calls(method.label, calls) for method in methods]

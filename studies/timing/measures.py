@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import platform
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from time import perf_counter, process_time
+from time import perf_counter
 
 import numpy as np
 from rich.progress import track
@@ -32,6 +33,7 @@ class Call:
         regret: [kg] propellant beyond the tight optimum; nan without a flight.
         solves: fixed-time optimisations; 0 where the method does not count them.
         keeps_limits: whether the flown plan respects every limit; False without a flight.
+        miss: [m] between where the plan, flown, lands and where it says; nan without a flight.
     """
 
     method: str
@@ -44,6 +46,7 @@ class Call:
     regret: float
     solves: int
     keeps_limits: bool
+    miss: float = math.nan
 
 
 @dataclass(frozen=True)
@@ -91,9 +94,9 @@ def measure_call(method: Method, case: Case) -> Call:
     """Plan once against both clocks, then check the plan."""
     if method.prepare is not None:
         method.prepare()
-    start, started = perf_counter(), process_time()
+    start, started = perf_counter(), method.clock()
     plan = method.run(case)
-    processor, seconds = process_time() - started, perf_counter() - start
+    processor, seconds = method.clock() - started, perf_counter() - start
     return Call(
         method.label,
         case.name,
@@ -105,6 +108,7 @@ def measure_call(method: Method, case: Case) -> Call:
         plan.propellant - case.propellant,
         plan.solves,
         plan.keeps_limits,
+        plan.residuals.landing_position if plan.nodes else math.nan,
     )
 
 

@@ -46,5 +46,6 @@ CALL_COLUMNS: tuple[Column[Call], ...] = (
     Column("regret_g", "regret", lambda call: _G * call.regret),
     Column("solves", "solves", lambda call: call.solves),
     Column("keeps_limits", "keeps limits", lambda call: call.keeps_limits),
+    Column("miss_m", "miss", lambda call: call.miss),
 )
 """Every call, as calls.csv has it."""
