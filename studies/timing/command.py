@@ -27,14 +27,16 @@ from studies.campaign.journal import open_journal
 from studies.campaign.provenance import describe_run, identify_run, write_provenance
 from studies.campaign.run_options import FolderOptions
 from studies.columns import console_table, write_csv, write_markdown
+from studies.timing.answer_times import AnswerBatch, AnswerTime, measure_answers, time_new_processes
 from studies.timing.conclusions import conclude
 from studies.timing.gfold_peer import PEER_METHOD, gfold_present
 from studies.timing.measures import Call, Summary, measure_calls, name_processor, summarize_calls
 from studies.timing.methods import Case, paper_cases, reference_cases, timed_methods
 from studies.timing.openscvx_peer import OPENSCVX_PACKAGE, open_openscvx, openscvx_version
 from studies.timing.qoco_peer import QOCO_PACKAGE, qoco_present
-from studies.timing.table import CALL_COLUMNS, SUMMARY_COLUMNS
+from studies.timing.table import ANSWER_COLUMNS, CALL_COLUMNS, SUMMARY_COLUMNS
 
+_ANSWER_PRODUCTS = ("answers.csv", "answers.md")
 _WING = Path(__file__).parent
 _CASES = _WING / "cases" / "pdg_cases.json"
 _PRODUCTS = ("timing.csv", "timing.md", "calls.csv", "provenance.json", "conclusions.txt", "timing.png")
@@ -49,6 +51,8 @@ class Timing(FolderOptions):
         preset: the setting they are drawn from.
         cases: JSON file of reference cases.
         repeats: calls per case and method; all of them count.
+        answers: dispersed and harsh starts each, whose answers by solve_pdg alone are timed; 0 for none.
+        processes: new processes in which the import and the first plans are timed.
         openscvx_python: interpreter of an environment that has OpenSCvx; this one by default.
         figures: draw the figure.
     """
@@ -57,6 +61,8 @@ class Timing(FolderOptions):
     preset: str = "paper"
     cases: Path = _CASES
     repeats: int = 1
+    answers: int = 2000
+    processes: int = 5
     openscvx_python: Path | None = None
     figures: bool = True
     out: Path = Path("results/timing")
@@ -65,6 +71,8 @@ class Timing(FolderOptions):
         """Check every option."""
         finite_number("starts", self.starts, at_least=1)
         finite_number("repeats", self.repeats, at_least=1)
+        finite_number("answers", self.answers, at_least=0)
+        finite_number("processes", self.processes, at_least=1)
 
 
 def find_peers(options: Timing) -> dict[str, str | None]:
@@ -140,14 +148,32 @@ def study_timing(options: Timing) -> list[Summary]:
             from studies.timing.picture import draw_timing
 
             draw_timing(methods, calls).savefig(out / "timing.png", dpi=110)
+        answer_times = time_answers(options, identity) if options.answers else []
         write_provenance(out / "provenance.json", {**describe_run(options), "work": journal.describe()})
     feasible = sum(case.feasible for case in cases)
     title = f"{feasible} feasible and {len(cases) - feasible} infeasible cases"
     Console(width=max(Console().width, 150)).print(console_table(SUMMARY_COLUMNS, summaries, title))
     for sentence in words:
         console.print(f"- {sentence}", markup=False, highlight=False)
+    if answer_times:
+        console.print(console_table(ANSWER_COLUMNS, answer_times, "processor time of answers"))
     console.print(f"results in {out}")
     return summaries
+
+
+def time_answers(options: Timing, identity: dict[str, Any]) -> list[AnswerTime]:
+    """Time answers in this process and in new ones; write their tables.
+
+    Raises:
+        ValueError: the folder holds another study.
+        OSError: the folder cannot be written.
+    """
+    folder = options.out / "answers"
+    with open_journal(folder, AnswerBatch, _ANSWER_PRODUCTS, identity, options.existing) as journal:
+        rows = time_new_processes(options.processes) + measure_answers(options.answers, journal)
+        write_csv(folder / "answers.csv", ANSWER_COLUMNS, rows)
+        write_markdown(folder / "answers.md", ANSWER_COLUMNS, rows)
+    return rows
 
 
 def write_timing(

@@ -211,7 +211,7 @@ def test_study_writes_its_folder(tmp_path, monkeypatch, capsys, present: bool) -
     cases = tmp_path / "cases.json"
     listed = json.loads(timing._CASES.read_text())["cases"]
     cases.write_text(json.dumps({"cases": [listed[0], listed[-1]]}))
-    summaries = study_timing(Timing(starts=1, cases=cases, out=tmp_path / "out"))
+    summaries = study_timing(Timing(starts=1, answers=0, cases=cases, out=tmp_path / "out"))
     assert [s.method for s in summaries] == [m.label for m in chosen]
     ours = summaries[0]
     assert (ours.feasible, ours.solved, ours.infeasible, ours.refused) == (2, 2, 1, 1)
@@ -236,7 +236,7 @@ def quick(tmp_path, monkeypatch) -> Timing:
     cases = tmp_path / "cases.json"
     listed = json.loads(timing._CASES.read_text())["cases"]
     cases.write_text(json.dumps({"cases": [listed[0], listed[-1]]}))
-    return Timing(starts=1, cases=cases, figures=False, out=tmp_path / "out")
+    return Timing(starts=1, answers=0, cases=cases, figures=False, out=tmp_path / "out")
 
 
 @pytest.mark.parametrize("stop", [0, 3, 5])

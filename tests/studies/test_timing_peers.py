@@ -352,7 +352,7 @@ def test_absent_peers_are_named_and_the_study_runs(tmp_path: Path, monkeypatch, 
     monkeypatch.setattr(timing, "timed_methods", lambda openscvx: chosen if openscvx is None else [])
     listed = json.loads(timing._CASES.read_text())["cases"]
     (tmp_path / "cases.json").write_text(json.dumps({"cases": listed[:1]}))
-    options = Timing(starts=1, cases=tmp_path / "cases.json", figures=False, out=tmp_path / "out")
+    options = Timing(starts=1, answers=0, cases=tmp_path / "cases.json", figures=False, out=tmp_path / "out")
     assert len(timing.study_timing(options)) == 2
     shown = capsys.readouterr().out
     assert all(f"{name} is not installed" in shown for name in ("gfold", "qoco", "openscvx"))
