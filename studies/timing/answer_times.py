@@ -66,15 +66,15 @@ class AnswerTime:
 
 def draw_dispersed(rng: np.random.Generator) -> list[float]:
     """Start anywhere from which most can land: low or high, near or far, slow or fast."""
-    height = rng.uniform(100.0, 2000.0)
+    height = rng.uniform(100.0, 1200.0)
     distance, bearing = rng.uniform(0.0, 0.5) * height, rng.uniform(0.0, 2.0 * np.pi)
     return [
         distance * np.cos(bearing),
         distance * np.sin(bearing),
         TARGET[2] + height,
         *rng.uniform(-15.0, 15.0, 2),
-        -rng.uniform(0.0, 1.2) * np.sqrt(2.0 * 1.62 * height),
-        rng.uniform(1180.0, 1200.0),
+        -rng.uniform(0.0, 0.9) * np.sqrt(2.0 * 1.62 * height),
+        rng.uniform(1190.0, 1200.0),
     ]
 
 
