@@ -269,6 +269,13 @@ def test_a_stopped_study_goes_on_where_it_was(quick: Timing, monkeypatch, stop: 
     assert len(made) == 8
     assert more[0].feasible == 3
 
+    def refuse(*_: object) -> Plan:
+        raise AssertionError("asked, and be it to warm up")
+
+    idle = [replace(method, plan=refuse) for method in timing.timed_methods()]
+    monkeypatch.setattr(timing, "timed_methods", lambda _openscvx: idle)
+    assert study_timing(replace(quick, starts=2, resume=True))[0] == more[0]
+
 
 def test_calls_of_another_study_are_not_mixed_in(quick: Timing, monkeypatch) -> None:
     study_timing(quick)

@@ -177,6 +177,20 @@ def test_a_half_written_last_line_is_named_and_mended(
 
 
 @pytest.mark.parametrize(
+    ("there", "put"), [('"count": 3', '"count": 4'), ("[3, ", "[7, "), ("item 3", "item 4")]
+)
+def test_a_line_that_still_reads_but_was_changed_is_dropped(tmp_path: Path, there: str, put: str) -> None:
+    with opened(tmp_path) as journal:
+        Work().run(journal)
+    file = tmp_path / "journal" / "items.jsonl"
+    text = file.read_text()
+    assert text.count(there) == 1
+    file.write_text(text.replace(there, put))
+    with opened(tmp_path) as journal:
+        assert [k for k in range(8) if journal.find((k, "x")) is None] == [3, 6, 7]
+
+
+@pytest.mark.parametrize(
     ("changes", "named"),
     [
         ({"options": {"preset": "hard", "limit": 1.5}}, r"options\.preset was .paper., is .hard."),
@@ -203,6 +217,10 @@ def test_a_run_is_replaced_only_when_asked(tmp_path: Path) -> None:
     with opened(tmp_path, Existing.OVERWRITE, options={}) as journal:
         assert journal.find((1,)) is None
     assert sorted(path.name for path in tmp_path.iterdir() if path.is_file()) == [".lock", "mine.txt"]
+    with opened(tmp_path, options={}):
+        pass  # it is the new run's folder
+    with pytest.raises(FolderError, match="holds another study"), opened(tmp_path):
+        pass
 
 
 def test_products_without_a_journal_are_a_run_too(tmp_path: Path) -> None:

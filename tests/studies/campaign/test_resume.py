@@ -217,11 +217,12 @@ def test_a_folder_that_was_half_removed_is_still_that_study(
         compare(options(tmp_path, episodes=20, study_seed=1, resume=True))
 
 
-def test_a_user_who_stops_a_study_reads_how_it_goes_on(capfd: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as stopped, resumable():
+@pytest.mark.parametrize("way", ["--resume goes on", "the same command goes on"])
+def test_a_user_who_stops_a_study_reads_how_it_goes_on(capfd: pytest.CaptureFixture[str], way: str) -> None:
+    with pytest.raises(SystemExit) as stopped, resumable(way):
         raise KeyboardInterrupt
     assert stopped.value.code == 130
-    assert "finished work is kept, --resume goes on" in " ".join(capfd.readouterr().err.split())
+    assert f"finished work is kept, {way}" in " ".join(capfd.readouterr().err.split())
 
 
 def test_tables_without_shards_are_a_study_too(tmp_path: Path) -> None:
