@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from guidance.arrays import Array
+from guidance.descent.problem import ROUNDING
 from guidance.flight_time.extremal import Extremal, PrimerProblem, fly_extremal
 from guidance.flight_time.path_limits import KEPT, POINTING, PathLimits, broken_limit
 from guidance.flight_time.primer_equations import LEAST_PULL, MOST_PULL, solve_primer
@@ -127,7 +128,7 @@ def offset_from(state: Array, target: Array, limits: PathLimits) -> Array:
         cosine, sine = math.cos(limits.glide_slope), math.sin(limits.glide_slope)
         across = math.hypot(offset[0], offset[1])
         outside = cosine * across - sine * offset[2]
-        if 0.0 < outside <= 1e-6 * max(1.0, math.sqrt(offset @ offset)):
+        if 0.0 < outside <= ROUNDING * max(1.0, math.sqrt(offset @ offset)):
             offset[:2] *= 1.0 - outside * cosine / across
             offset[2] += outside * sine
     return offset
