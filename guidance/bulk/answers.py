@@ -38,7 +38,7 @@ class Descents:
         first_thrust: [N] shape (N, 3), at the start; zero where the flight begins with a coast.
         method: shape (N,): 'indirect', or the method of `solve_pdg` that answered; empty where nobody did.
         nodes: the flights on nodes, where they were asked for; else None.
-        certificates: those that `solve_pdg` gave, by row.
+        certificates: by row, those of `solve_pdg` and of bounds that were searched for.
     """
 
     starts: Starts
@@ -84,6 +84,6 @@ class Descents:
         starts = self.starts
         vehicle = vehicle_of(starts.lander, starts.gravity, starts.glide_slope_limit, starts.speed_limit)
         start, target = starts.states[index], starts.targets[index]
-        answer, bound = answer_start(start, target, vehicle, new_extremal(), True)
+        answer, bound = answer_start(start, target, vehicle, new_extremal())
         infeasible = answer.finding == Finding.INFEASIBLE
         return certify_cover(starts.problem(index), bound.spent_at_most, bound.times, bound.cover, infeasible)

@@ -9,13 +9,14 @@ from typing import NamedTuple
 import numpy as np
 
 from guidance.arrays import Array
+from guidance.descent.problem import ROUNDING
 from guidance.flight_time.extremal import Extremal, PrimerProblem, fly_extremal
 from guidance.flight_time.path_limits import KEPT, POINTING, PathLimits, broken_limit
 from guidance.flight_time.primer_equations import LEAST_PULL, MOST_PULL, solve_primer
 from guidance.kernel import compile_kernel
 from guidance.lander import Lander
 from guidance.lower_bound.dual_case import DualCase, chord_growth
-from guidance.lower_bound.neighbour_cover import bound_by_neighbours, bound_extremal
+from guidance.lower_bound.neighbour_cover import bound_by_neighbours
 from guidance.lower_bound.time_cover import GRANTED, TimeCover, claimed_bound
 
 
@@ -103,22 +104,6 @@ class Bound(NamedTuple):
     cover: TimeCover
 
 
-class BoundAim(NamedTuple):
-    """What a bound is made for.
-
-    Attributes:
-        unit: [m/s^2] full thrust over start mass.
-        most: [m/s] it speaks of flights that spend no more.
-        target: [m/s] the level that is enough.
-        search: whether better primers are searched for where the neighbours' are weak.
-    """
-
-    unit: float
-    most: float
-    target: float
-    search: bool
-
-
 def vehicle_of(
     lander: Lander, gravity: Array, glide_slope_limit: float | None, speed_limit: float | None
 ) -> Vehicle:
@@ -143,7 +128,7 @@ def offset_from(state: Array, target: Array, limits: PathLimits) -> Array:
         cosine, sine = math.cos(limits.glide_slope), math.sin(limits.glide_slope)
         across = math.hypot(offset[0], offset[1])
         outside = cosine * across - sine * offset[2]
-        if 0.0 < outside <= 1e-6 * max(1.0, math.sqrt(offset @ offset)):
+        if 0.0 < outside <= ROUNDING * max(1.0, math.sqrt(offset @ offset)):
             offset[:2] *= 1.0 - outside * cosine / across
             offset[2] += outside * sine
     return offset
@@ -175,16 +160,27 @@ def domain_of(problem: PrimerProblem, min_thrust: float) -> int:
 
 
 @compile_kernel
-def bound_start(problem: PrimerProblem, vehicle: Vehicle, x: Extremal, aim: BoundAim) -> Bound:
-    """Bound the velocity change of the flights of a problem, in seconds, from its extremal."""
-    exhaust, unit = vehicle.exhaust_velocity, aim.unit
+def bound_start(
+    problem: PrimerProblem, vehicle: Vehicle, x: Extremal, unit: float, most: float, target: float
+) -> Bound:
+    """Bound the velocity change of the flights of a problem.
+
+    Args:
+        problem: in seconds.
+        vehicle: lander, gravity and limits.
+        x: the extremal, in seconds.
+        unit: [m/s^2] full thrust over start mass.
+        most: [m/s] the bound speaks of flights that spend no more.
+        target: [m/s] the level that is enough.
+    """
+    exhaust = vehicle.exhaust_velocity
     case = DualCase(
         unit * problem.position,
         unit * problem.velocity,
         np.zeros(3),
         vehicle.gravity,
         unit,
-        unit * chord_growth(aim.most, exhaust),
+        unit * chord_growth(most, exhaust),
         0.0,
         0.0,
         max(vehicle.limits.least_cosine, -1.0),
@@ -192,17 +188,12 @@ def bound_start(problem: PrimerProblem, vehicle: Vehicle, x: Extremal, aim: Boun
         0.0,
         0.0,  # no limit on the path: its flight keeps them
     )
-    if aim.search:
-        times, cover = bound_extremal(x, problem, case, aim.target, exhaust)
-    else:
-        times, cover = bound_by_neighbours(x, problem, case, aim.target, exhaust)
-    return Bound(aim.most, times, cover)
+    times, cover = bound_by_neighbours(x, problem, case, target, exhaust)
+    return Bound(most, times, cover)
 
 
 @compile_kernel
-def answer_start(
-    state: Array, target: Array, vehicle: Vehicle, x: Extremal, search: bool
-) -> tuple[Answer, Bound]:
+def answer_start(state: Array, target: Array, vehicle: Vehicle, x: Extremal) -> tuple[Answer, Bound]:
     """Answer one start.
 
     Args:
@@ -210,7 +201,6 @@ def answer_start(
         target: [m] shape (3,).
         vehicle: lander, gravity and limits.
         x: the extremal, where one was found; in seconds.
-        search: whether better primers are searched for where the bound is weak.
 
     Returns:
         The answer, and its proof; without a flight to prove anything of, an empty one.
@@ -228,13 +218,13 @@ def answer_start(
     spent, tank = -exhaust * math.log1p(-share), exhaust * math.log(mass / vehicle.dry_mass)
     if spent > tank:
         enough = tank + 2.0 * GRANTED * exhaust
-        bound = bound_start(problem, vehicle, x, BoundAim(unit, tank, enough, search))
+        bound = bound_start(problem, vehicle, x, unit, tank, enough)
         if bound.cover.level >= enough:
             return Answer(_INFEASIBLE, math.nan, math.inf), bound
         return Answer(_TANK_TOO_SMALL, math.nan, math.nan), nothing
     broken = broken_limit(fly_extremal(x, problem), vehicle.limits, unit)
     if broken != KEPT:
         return Answer(_LEANS + broken - POINTING, math.nan, math.nan), nothing
-    bound = bound_start(problem, vehicle, x, BoundAim(unit, spent, spent, search))
+    bound = bound_start(problem, vehicle, x, unit, spent, spent)
     least = claimed_bound(bound.cover.level, spent, exhaust)
     return Answer(_OPTIMAL, mass * share, mass * -math.expm1(-least / exhaust)), bound

@@ -19,13 +19,16 @@ from guidance.constants import MOON_GRAVITY
 from guidance.descent.certificate import Certificate
 from guidance.descent.plan import Plan
 from guidance.flight_time.neighbouring_extremals import new_extremal
+from guidance.flight_time.primer_vector import find_primer_flight
 from guidance.kernel import compile_kernel
 from guidance.lander import PAPER_LANDER, Lander
+from guidance.lower_bound.proof import prove_least_propellant
 from guidance.pdg.solve import solve_pdg
 from guidance.state import State
 from guidance.validation import finite_number
 
 _CHUNK = 64  # starts that a thread takes at once
+_WEAK = 4e-6  # of the start mass, 4.8 g of 1200 kg: a bound so far below its flight is searched for
 _FEWEST_NODES = 2
 _INDIRECT = "indirect"
 _OPTIMAL_FOUND, _INFEASIBLE_FOUND = int(Finding.OPTIMAL), int(Finding.INFEASIBLE)
@@ -47,7 +50,7 @@ def _answer_rows(begin: int, end: int, states: Array, targets: Array, vehicle: V
     """Answer the starts of some rows."""
     x = new_extremal()
     for k in range(begin, end):
-        answer, _ = answer_start(states[k], targets[k], vehicle, x, True)
+        answer, _ = answer_start(states[k], targets[k], vehicle, x)
         rows.lower_bound[k] = answer.lower_bound
         if answer.finding == _INFEASIBLE_FOUND:
             rows.status[k] = INFEASIBLE
@@ -100,10 +103,9 @@ def solve_pdg_many(
     """
     starts = Starts.parse(states, targets, lander, gravity, (glide_slope_limit, speed_limit))
     rows = _no_rows(len(starts), _node_count(nodes))
-    _answer_all(starts, rows, _thread_count(threads))
+    certificates = _answer_all(starts, rows, _thread_count(threads))
     method = np.full(len(starts), "", "<U8")
     method[rows.status != UNDECIDED] = _INDIRECT
-    certificates: dict[int, Certificate | None] = {}
     if fallback:
         for k in np.flatnonzero(rows.status == UNDECIDED).tolist():
             plan = _ask(starts, k)
@@ -141,22 +143,38 @@ def _thread_count(threads: int | None) -> int:
     return os.cpu_count() or 1 if threads is None else int(finite_number("threads", threads, at_least=1))
 
 
-def _answer_all(starts: Starts, rows: _Rows, threads: int) -> None:
-    """Answer every start that compiled code can; the kernel holds no lock, so that threads work at once."""
+def _answer_all(starts: Starts, rows: _Rows, threads: int) -> dict[int, Certificate | None]:
+    """Answer every start that compiled code can; it holds no lock, so that threads work at once.
+
+    Returns:
+        Certificates of the bounds that had to be searched for, by row.
+    """
     vehicle = vehicle_of(starts.lander, starts.gravity, starts.glide_slope_limit, starts.speed_limit)
     spans = [(k, min(k + _CHUNK, len(starts))) for k in range(0, len(starts), _CHUNK)]
 
-    def answer(span: tuple[int, int]) -> None:
-        _answer_rows(*span, starts.states, starts.targets, vehicle, rows)
+    def answer(span: tuple[int, int]) -> dict[int, Certificate | None]:
+        begin, end = span
+        _answer_rows(begin, end, starts.states, starts.targets, vehicle, rows)
+        gap = rows.propellant[begin:end] - rows.lower_bound[begin:end]
+        weak = begin + np.flatnonzero(gap > _WEAK * starts.states[begin:end, 6])
+        return {k: _tighten(starts, k, rows) for k in weak.tolist()}
 
-    for span in spans[:1]:
-        answer(span)
+    found = [answer(span) for span in spans[:1]]  # compiles
     if min(threads, len(spans)) <= 1:
-        for span in spans[1:]:
-            answer(span)
-        return
-    with ThreadPoolExecutor(min(threads, len(spans))) as pool:
-        list(pool.map(answer, spans[1:]))
+        found += [answer(span) for span in spans[1:]]
+    else:
+        with ThreadPoolExecutor(min(threads, len(spans))) as pool:
+            found += pool.map(answer, spans[1:])
+    return {k: certificate for part in found for k, certificate in part.items()}
+
+
+def _tighten(starts: Starts, row: int, rows: _Rows) -> Certificate:
+    """Search for a better bound of a flight that was found, and write it."""
+    problem = starts.problem(row)
+    known = float(rows.propellant[row]), float(rows.time_of_flight[row])
+    certificate = prove_least_propellant(problem, *known, find_primer_flight(problem))
+    rows.lower_bound[row] = certificate.lower_bound
+    return certificate
 
 
 def _ask(starts: Starts, index: int) -> Plan:

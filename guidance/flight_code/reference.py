@@ -91,7 +91,7 @@ def answer_question(question: Question) -> CodeAnswer:
         return CodeAnswer(refusal, math.nan, math.nan, math.nan, nothing)
     x, thrust = new_extremal(), np.empty(3)
     state, target = np.array(question.state), np.array(question.target)
-    answer, _ = answer_start(state, target, _vehicle(question), x, False)
+    answer, _ = answer_start(state, target, _vehicle(question), x)
     if answer.finding != Finding.OPTIMAL:
         return CodeAnswer(Finding(answer.finding), math.nan, math.nan, answer.lower_bound, nothing)
     set_thrust(x, 0.0, question.max_thrust, thrust)

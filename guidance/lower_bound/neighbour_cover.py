@@ -28,7 +28,6 @@ from guidance.lower_bound.time_cover import (
     CoverAim,
     TimeCover,
     along_change,
-    cover_times,
     join_cover,
     last_primer,
     nearest_open_cell,
@@ -42,9 +41,8 @@ _TRIES = 2  # at a cell's own time, each from the neighbours of the one before
 _BEFORE = 1.0 - 1e-9  # of the best time: a node of the grid lies at it, up to rounding
 _EARLIEST = 0.1  # of the best time
 _IMPULSES = 1.02  # times the level: where two impulses spend so much, their primer is enough
-_CELLS, _FINE_CELLS = 70, 240  # of the grid of times, up to the best time; where the search has to help
-_TOLERANCE, _FINE_TOLERANCE = 2e-6, 1e-6  # of the exhaust velocity: 2.4 g of 1200 kg
-_WEAK = 4e-6  # of the exhaust velocity: a bound so far below the flight is searched for
+_CELLS = 70  # of the grid of times, up to the best time
+_TOLERANCE = 2e-6  # of the exhaust velocity: 2.4 g of 1200 kg
 MOST_PRIMERS = 24
 """Of a cover by neighbours, the constant ones included."""
 
@@ -158,19 +156,7 @@ def cover_by_neighbours(
 def bound_by_neighbours(
     x: Extremal, problem: PrimerProblem, case: DualCase, target: float, exhaust: float
 ) -> tuple[Array, TimeCover]:
-    """What neighbours alone prove; arguments and answer as of `bound_extremal`."""
-    aim = CoverAim(target, _TOLERANCE * exhaust, -np.inf)
-    times = time_grid(case, target * (1.0 + 1e-12), x.times[2], _CELLS)
-    return times, cover_by_neighbours(find_neighbours(x, problem), problem, times, case, aim)
-
-
-@compile_kernel
-def bound_extremal(
-    x: Extremal, problem: PrimerProblem, case: DualCase, target: float, exhaust: float
-) -> tuple[Array, TimeCover]:
     """Bound the velocity change of every time of flight, from the extremal of the best time.
-
-    Where its neighbours leave the bound weak, the best primers are searched for.
 
     Args:
         x: the extremal, in seconds.
@@ -182,13 +168,6 @@ def bound_extremal(
     Returns:
         [s] The grid of times, and the cover of its cells.
     """
-    times, cover = bound_by_neighbours(x, problem, case, target, exhaust)
-    if cover.level >= target - _WEAK * exhaust:
-        return times, cover
-    fine = time_grid(case, target * (1.0 + 1e-12), x.times[2], _FINE_CELLS)
-    searched = cover_times(
-        fine, case, primer_of(x, case), x.times[2], CoverAim(target, _FINE_TOLERANCE * exhaust, -np.inf)
-    )
-    if searched.level > cover.level:
-        return fine, searched
-    return times, cover
+    aim = CoverAim(target, _TOLERANCE * exhaust, -np.inf)
+    times = time_grid(case, target * (1.0 + 1e-12), x.times[2], _CELLS)
+    return times, cover_by_neighbours(find_neighbours(x, problem), problem, times, case, aim)

@@ -75,7 +75,7 @@ def test_limits_refuse_what_the_indirect_method_refuses():
         speed = float(rng.uniform(30.0, 90.0)) if k % 3 == 2 else None
         problem = LandingProblem(State.parse(start), TARGET, lander, GRAVITY, glide, speed)
         vehicle = vehicle_of(lander, GRAVITY, glide, speed)
-        answer, _ = answer_start(np.array(start), TARGET, vehicle, new_extremal(), False)
+        answer, _ = answer_start(np.array(start), TARGET, vehicle, new_extremal())
         seen[Finding(answer.finding)] += 1
         flight = find_primer_flight(problem)
         assert (flight is not None) == (answer.finding == Finding.OPTIMAL)
