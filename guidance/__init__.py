@@ -9,6 +9,7 @@ from guidance.exports import lazy_exports
 
 if TYPE_CHECKING:
     from guidance.constants import MOON_GRAVITY, STANDARD_GRAVITY
+    from guidance.descent.limits import Limits
     from guidance.descent.plan import GuidanceError, InfeasibleError, Plan, PlanStatus, SolverFailedError
     from guidance.dynamics import propagate
     from guidance.lander import PAPER_LANDER, Lander
@@ -23,6 +24,7 @@ __all__ = [
     "GuidanceError",
     "InfeasibleError",
     "Lander",
+    "Limits",
     "Plan",
     "PlanStatus",
     "SolverFailedError",
@@ -43,6 +45,7 @@ __getattr__, __dir__ = lazy_exports(
         "GuidanceError": "guidance.descent.plan",
         "InfeasibleError": "guidance.descent.plan",
         "Lander": "guidance.lander",
+        "Limits": "guidance.descent.limits",
         "Plan": "guidance.descent.plan",
         "PlanStatus": "guidance.descent.plan",
         "SolverFailedError": "guidance.descent.plan",

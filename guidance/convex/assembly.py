@@ -18,6 +18,7 @@ from guidance.constants import MOON_GRAVITY
 from guidance.convex.clarabel_solver import ConicAnswer, ConicSolver
 from guidance.convex.constraints import Rows
 from guidance.convex.scaling import ScaledProblem, scale_problem
+from guidance.descent.limits import Limits
 from guidance.descent.problem import LandingProblem
 from guidance.lander import Lander
 from guidance.state import State
@@ -86,8 +87,7 @@ def nominal_numbers(nodes: int) -> ScaledProblem:
         np.zeros(3),
         Lander(min_thrust=1000.0, pointing_limit=1.0),
         np.array(MOON_GRAVITY),
-        glide_slope_limit=1.0,
-        speed_limit=100.0,
+        Limits(glide_slope=1.0, speed=100.0),
         target_velocity=np.array([2.0, 1.0, -5.0]),
     )
     return scale_problem(problem, 30.0, nodes)

@@ -12,6 +12,7 @@ from guidance.exports import lazy_exports
 if TYPE_CHECKING:
     from guidance.descent.certificate import Certificate, Proof
     from guidance.descent.dual_bound import DualBound, DualPiece
+    from guidance.descent.limits import NO_LIMITS, Limits
     from guidance.descent.plan import GuidanceError, InfeasibleError, Plan, PlanStatus, SolverFailedError
     from guidance.descent.problem import LandingProblem
     from guidance.descent.residuals import FLIGHT_TOLERANCE, FlightTolerance, Residuals
@@ -25,6 +26,10 @@ _HOMES = {
     "guidance.descent.dual_bound": (
         "DualBound",
         "DualPiece",
+    ),
+    "guidance.descent.limits": (
+        "NO_LIMITS",
+        "Limits",
     ),
     "guidance.descent.plan": (
         "GuidanceError",
@@ -44,6 +49,7 @@ _HOMES = {
 
 __all__ = [
     "FLIGHT_TOLERANCE",
+    "NO_LIMITS",
     "Certificate",
     "DualBound",
     "DualPiece",
@@ -51,6 +57,7 @@ __all__ = [
     "GuidanceError",
     "InfeasibleError",
     "LandingProblem",
+    "Limits",
     "Plan",
     "PlanStatus",
     "Proof",

@@ -8,9 +8,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from guidance.arrays import Array
+from guidance.descent.limits import NO_LIMITS, Limits
 from guidance.lander import Lander
 from guidance.state import State
-from guidance.validation import finite_number, finite_vector
+from guidance.validation import finite_vector
 
 LARGEST_NUMBER = 1e9
 """No distance, speed or mass of a powered descent is larger; far beyond it, their powers overflow."""
@@ -35,9 +36,7 @@ class LandingProblem:
         target: [m] shape (3,), site frame.
         lander: the vehicle; its pointing limit is measured from the z axis.
         gravity: [m/s^2] shape (3,), constant.
-        glide_slope_limit: [rad] greatest angle, seen from the landing point, between the vehicle and the z
-            axis, in (0, pi/2]; None for none.
-        speed_limit: [m/s] greatest speed; None for none.
+        limits: what the path has to keep.
         target_velocity: [m/s] shape (3,), at the target; rest unless given.
 
     Raises:
@@ -49,8 +48,7 @@ class LandingProblem:
     target: Array
     lander: Lander
     gravity: Array
-    glide_slope_limit: float | None = None
-    speed_limit: float | None = None
+    limits: Limits = NO_LIMITS
     target_velocity: Array = field(default_factory=lambda: np.zeros(3))
 
     def __post_init__(self) -> None:
@@ -61,6 +59,8 @@ class LandingProblem:
             object.__setattr__(self, name, vector)
         if not isinstance(self.lander, Lander):
             raise ValueError(f"lander must be a Lander, got {self.lander!r}")
+        if not isinstance(self.limits, Limits):
+            raise ValueError(f"limits must be a Limits, got {self.limits!r}")
         numbers = {name: getattr(self, name) for name in ("target", "gravity", "target_velocity")}
         for name, vector in ({"state": self.state.as_array()} | numbers).items():
             if np.abs(vector).max() > LARGEST_NUMBER:
@@ -74,10 +74,16 @@ class LandingProblem:
                 f"state: start altitude {self.state.position[2]:g} m lies below the target's, "
                 f"{self.target[2]:g} m"
             )
-        if self.glide_slope_limit is not None:
-            finite_number("glide_slope_limit", self.glide_slope_limit, above=0.0, at_most=math.pi / 2)
-        if self.speed_limit is not None:
-            finite_number("speed_limit", self.speed_limit, above=0.0)
+
+    @property
+    def glide_slope_limit(self) -> float | None:
+        """[rad] that of the limits."""
+        return self.limits.glide_slope
+
+    @property
+    def speed_limit(self) -> float | None:
+        """[m/s] that of the limits."""
+        return self.limits.speed
 
     @property
     def has_glide_slope(self) -> bool:

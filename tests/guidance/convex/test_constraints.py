@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from guidance import Lander, State
+from guidance import Lander, Limits, State
 from guidance.convex import constraints
 from guidance.convex.condensed import CondensedLayout, burnt_mass, landing_moments
 from guidance.convex.layout import Layout
@@ -23,8 +23,7 @@ PROBLEM = LandingProblem(
     np.array([5.0, 5.0, 50.0]),
     LANDER,
     np.array([0.1, -0.2, -1.62]),
-    glide_slope_limit=0.5,
-    speed_limit=40.0,
+    Limits(glide_slope=0.5, speed=40.0),
     target_velocity=np.array([1.0, -2.0, -6.0]),
 )
 TIME = 20.0

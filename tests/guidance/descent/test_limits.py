@@ -1,0 +1,59 @@
+"""Limits as one value: what it refuses, and that the old keywords are shorthands of it."""
+
+import math
+
+import numpy as np
+import pytest
+from descents import GRAVITY, TARGET
+
+from guidance import PAPER_LANDER, Limits, State, solve_pdg
+from guidance.descent.problem import LandingProblem
+
+START = [200.0, 100.0, 950.0, -8.0, -4.0, -30.0, 1200.0]
+
+
+@pytest.mark.parametrize(
+    ("given", "name"),
+    [
+        ({"glide_slope": 0.0}, "limits.glide_slope"),
+        ({"glide_slope": 1.6}, "limits.glide_slope"),
+        ({"glide_slope": math.nan}, "limits.glide_slope"),
+        ({"speed": 0.0}, "limits.speed"),
+        ({"speed": math.inf}, "limits.speed"),
+        ({"speed": "fast"}, "limits.speed"),
+    ],
+)
+def test_what_nothing_can_keep_is_refused_by_its_name(given, name):
+    with pytest.raises(ValueError, match=name):
+        Limits(**given)
+
+
+def test_limits_are_given_by_name_only():
+    with pytest.raises(TypeError):
+        Limits(0.5)  # pyright: ignore[reportCallIssue]
+
+
+@pytest.mark.parametrize("name", ["glide_slope", "speed"])
+def test_a_limit_given_twice_is_refused_with_both_names(name):
+    given = {"limits": Limits(**{name: 1.0}), f"{name}_limit": 1.0}
+    with pytest.raises(ValueError, match=rf"{name}_limit and limits\.{name} "):
+        solve_pdg(START, TARGET, **given)  # pyright: ignore[reportArgumentType]
+
+
+def test_limits_must_be_limits():
+    with pytest.raises(ValueError, match="limits"):
+        solve_pdg(START, TARGET, limits=0.5)  # pyright: ignore[reportArgumentType]
+    with pytest.raises(ValueError, match="limits"):
+        LandingProblem(State.parse(START), TARGET, PAPER_LANDER, GRAVITY, 0.5)  # pyright: ignore[reportArgumentType]
+
+
+def test_a_shorthand_is_its_limit_to_the_bit():
+    short = solve_pdg(START, TARGET, glide_slope_limit=0.6, speed_limit=45.0)
+    whole = solve_pdg(START, TARGET, limits=Limits(glide_slope=0.6, speed=45.0))
+    mixed = solve_pdg(START, TARGET, limits=Limits(speed=45.0), glide_slope_limit=0.6)
+    for plan in (whole, mixed):
+        assert plan.problem.limits == short.problem.limits == Limits(glide_slope=0.6, speed=45.0)
+        assert plan.thrust.tobytes() == short.thrust.tobytes()
+    assert short.problem.glide_slope_limit == 0.6
+    assert short.problem.speed_limit == 45.0
+    assert np.linalg.norm(short.velocity, axis=1).max() == pytest.approx(45.0, abs=0.1)
