@@ -9,7 +9,7 @@ from guidance.exports import lazy_exports
 
 if TYPE_CHECKING:
     from guidance.constants import MOON_GRAVITY, STANDARD_GRAVITY
-    from guidance.descent.limits import Limits
+    from guidance.descent.limits import Cone, Limits
     from guidance.descent.plan import GuidanceError, InfeasibleError, Plan, PlanStatus, SolverFailedError
     from guidance.dynamics import propagate
     from guidance.lander import PAPER_LANDER, Lander
@@ -21,6 +21,7 @@ __all__ = [
     "MOON_GRAVITY",
     "PAPER_LANDER",
     "STANDARD_GRAVITY",
+    "Cone",
     "GuidanceError",
     "InfeasibleError",
     "Lander",
@@ -42,6 +43,7 @@ __getattr__, __dir__ = lazy_exports(
         "MOON_GRAVITY": "guidance.constants",
         "PAPER_LANDER": "guidance.lander",
         "STANDARD_GRAVITY": "guidance.constants",
+        "Cone": "guidance.descent.limits",
         "GuidanceError": "guidance.descent.plan",
         "InfeasibleError": "guidance.descent.plan",
         "Lander": "guidance.lander",

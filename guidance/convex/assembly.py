@@ -18,7 +18,7 @@ from guidance.constants import MOON_GRAVITY
 from guidance.convex.clarabel_solver import ConicAnswer, ConicSolver
 from guidance.convex.constraints import Rows
 from guidance.convex.scaling import ScaledProblem, scale_problem
-from guidance.descent.limits import Limits
+from guidance.descent.limits import Cone, Limits
 from guidance.descent.problem import LandingProblem
 from guidance.lander import Lander
 from guidance.state import State
@@ -87,7 +87,7 @@ def nominal_numbers(nodes: int) -> ScaledProblem:
         np.zeros(3),
         Lander(min_thrust=1000.0, pointing_limit=1.0),
         np.array(MOON_GRAVITY),
-        Limits(glide_slope=1.0, speed=100.0),
+        Limits(glide_slope=1.0, speed=100.0, final_thrust_direction=Cone(0.5, (0.1, -0.2, 1.0))),
         target_velocity=np.array([2.0, 1.0, -5.0]),
     )
     return scale_problem(problem, 30.0, nodes)

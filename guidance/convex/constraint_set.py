@@ -27,6 +27,7 @@ class ConstraintSet:
         pointing: whether the thrust direction is limited.
         glide_slope: whether there is a glide slope limit below the horizon.
         speed_limit: whether the speed is limited.
+        final_thrust_direction: whether the last thrust's direction is limited.
         free_landing_point: whether the landing point may move in the target's plane.
     """
 
@@ -35,19 +36,21 @@ class ConstraintSet:
     pointing: bool = False
     glide_slope: bool = False
     speed_limit: bool = False
+    final_thrust_direction: bool = False
     free_landing_point: bool = False
 
     @classmethod
     def of(cls, problem: LandingProblem, nodes: int, free_landing_point: bool = False) -> ConstraintSet:
         """The constraint set that `problem` needs."""
-        pointing = problem.lander.pointing_limit
+        pointing, limits = problem.lander.pointing_limit, problem.limits
         return cls(
             nodes,
-            problem.lander.min_thrust > 0.0,
-            pointing is not None and pointing < np.pi,
-            problem.has_glide_slope,
-            problem.speed_limit is not None,
-            free_landing_point,
+            min_thrust=problem.lander.min_thrust > 0.0,
+            pointing=pointing is not None and pointing < np.pi,
+            glide_slope=problem.has_glide_slope,
+            speed_limit=limits.speed is not None,
+            final_thrust_direction=limits.final_thrust_direction is not None,
+            free_landing_point=free_landing_point,
         )
 
     @property
@@ -61,6 +64,7 @@ class ConstraintSet:
             (self.min_thrust, constraints.min_thrust),
             (True, constraints.altitude_floor),
             (self.pointing, constraints.pointing),
+            (self.final_thrust_direction, constraints.final_thrust_direction),
             (True, constraints.dry_mass),
             (self.free_landing_point, constraints.landing_error_limit),
             (True, constraints.thrust_cone),
@@ -84,6 +88,7 @@ class ConstraintSet:
             (True, constraints.max_thrust),
             (self.min_thrust, constraints.min_thrust),
             (self.pointing, constraints.pointing),
+            (self.final_thrust_direction, constraints.final_thrust_direction),
             (True, constraints.dry_mass),
             (True, constraints.thrust_cone),
         ]

@@ -164,6 +164,14 @@ def pointing(layout: Layout, scaled: ScaledProblem) -> Rows:
     return Rows("pointing", "nonnegative", n, bound=np.zeros(n), **entries)
 
 
+def final_thrust_direction(layout: Layout, scaled: ScaledProblem) -> Rows:
+    """Thrust acceleration along the axis >= cos(limit) * slack at the last node; convex as `pointing` is."""
+    column = np.append(layout.acceleration[-1], layout.slack[-1])
+    value = scaled.final_thrust * np.array([-1.0, -1.0, -1.0, 1.0])
+    row = np.zeros(4, dtype=np.int64)
+    return Rows("final thrust direction", "nonnegative", 1, row, column, value, np.zeros(1))
+
+
 def glide_slope(layout: Layout, scaled: ScaledProblem) -> Rows:
     """Every node but the last lies in the upright cone above the landing point."""
     position = layout.position[:-1]

@@ -9,11 +9,12 @@ same numbers at every solve. In raw SI the solver says "Solved" and is a percent
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from guidance.arrays import Array
+from guidance.descent.limits import Cone
 from guidance.descent.problem import LandingProblem
 
 _LOOSE = 10.0  # scaled limit that binds no flight worth comparing
@@ -56,6 +57,7 @@ class ScaledProblem:
         pointing_cosine: cosine of the pointing limit; -1 for none.
         glide_angle: [rad] glide slope limit; pi/2 for none.
         speed_limit: greatest speed; 0 for none.
+        final_thrust: axis of the final thrust's cone and the cosine of its angle, shape (4,); zeros for none.
         error_limit: greatest landing error where the landing point is free.
     """
 
@@ -72,6 +74,7 @@ class ScaledProblem:
     pointing_cosine: float = -1.0
     glide_angle: float = np.pi / 2
     speed_limit: float = 0.0
+    final_thrust: Array = field(default_factory=lambda: np.zeros(4))
     error_limit: float = 0.0
 
     @property
@@ -133,6 +136,10 @@ def tangent_mass_bounds(problem: LandingProblem, log_mass: Array, kappa: float) 
     return MassBounds(touch * kappa, bound, ratio * touch * kappa, ratio * bound)
 
 
+def _axis_and_cosine(cone: Cone | None) -> Array:
+    return np.zeros(4) if cone is None else np.append(cone.direction, math.cos(cone.angle))
+
+
 def scale_problem(
     problem: LandingProblem,
     time: float,
@@ -181,5 +188,6 @@ def scale_problem(
         pointing_cosine=-1.0 if limit is None else float(np.cos(limit)),
         glide_angle=np.pi / 2 if problem.glide_slope_limit is None else problem.glide_slope_limit,
         speed_limit=0.0 if speed is None else speed / (acceleration * time),
+        final_thrust=_axis_and_cosine(problem.limits.final_thrust_direction),
         error_limit=_LOOSE if error_limit is None else error_limit / length,
     )

@@ -12,7 +12,7 @@ from guidance.exports import lazy_exports
 if TYPE_CHECKING:
     from guidance.descent.certificate import Certificate, Proof
     from guidance.descent.dual_bound import DualBound, DualPiece
-    from guidance.descent.limits import NO_LIMITS, Limits
+    from guidance.descent.limits import NO_LIMITS, Cone, Limits
     from guidance.descent.plan import GuidanceError, InfeasibleError, Plan, PlanStatus, SolverFailedError
     from guidance.descent.problem import LandingProblem
     from guidance.descent.residuals import FLIGHT_TOLERANCE, FlightTolerance, Residuals
@@ -29,6 +29,7 @@ _HOMES = {
     ),
     "guidance.descent.limits": (
         "NO_LIMITS",
+        "Cone",
         "Limits",
     ),
     "guidance.descent.plan": (
@@ -51,6 +52,7 @@ __all__ = [
     "FLIGHT_TOLERANCE",
     "NO_LIMITS",
     "Certificate",
+    "Cone",
     "DualBound",
     "DualPiece",
     "FlightTolerance",

@@ -5,7 +5,46 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from guidance.validation import finite_number
+import numpy as np
+
+from guidance.arrays import Array
+from guidance.validation import finite_number, finite_vector
+
+
+@dataclass(frozen=True)
+class Cone:
+    """The directions within an angle of an axis.
+
+    Attributes:
+        angle: [rad] in (0, pi].
+        axis: direction, of any length but zero; kept as a unit vector. Up unless given.
+
+    Raises:
+        ValueError: the angle is out of range, or the axis is no direction.
+    """
+
+    angle: float
+    axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
+
+    def __post_init__(self) -> None:
+        """Make the axis a unit vector."""
+        finite_number("angle", self.angle, above=0.0, at_most=math.pi)
+        axis = finite_vector("axis", self.axis, 3)
+        length = float(np.linalg.norm(axis))
+        if not 0.0 < length < math.inf:
+            raise ValueError(f"axis must be a direction, got {axis.tolist()}")
+        east, north, up = (float(number) for number in axis / length)
+        object.__setattr__(self, "axis", (east, north, up))
+
+    @property
+    def direction(self) -> Array:
+        """The axis, shape (3,)."""
+        return np.array(self.axis)
+
+    def excess(self, vector: Array) -> float:
+        """[rad] by how much a vector, shape (3,) and not zero, leaves the cone; 0 inside."""
+        across = float(np.linalg.norm(np.cross(self.direction, vector)))
+        return max(0.0, math.atan2(across, float(self.direction @ vector)) - self.angle)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -16,13 +55,17 @@ class Limits:
         glide_slope: [rad] greatest angle, seen from the landing point, between the vehicle and the z axis, in
             (0, pi/2].
         speed: [m/s] greatest speed.
+        final_thrust_direction: directions that the thrust may have at the end, which is the last node: a
+            touchdown upright. Over the last interval the thrust turns into the cone, the faster the finer
+            the mesh. A thrust of nothing has no direction.
 
     Raises:
-        ValueError: a limit is not finite, or out of range.
+        ValueError: a limit is not finite, out of range, or not of its type.
     """
 
     glide_slope: float | None = None
     speed: float | None = None
+    final_thrust_direction: Cone | None = None
 
     def __post_init__(self) -> None:
         """Refuse limits that nothing can keep."""
@@ -30,6 +73,12 @@ class Limits:
             finite_number("limits.glide_slope", self.glide_slope, above=0.0, at_most=math.pi / 2)
         if self.speed is not None:
             finite_number("limits.speed", self.speed, above=0.0)
+        self._demand_cone("final_thrust_direction")
+
+    def _demand_cone(self, name: str) -> None:
+        value = getattr(self, name)
+        if value is not None and not isinstance(value, Cone):
+            raise ValueError(f"limits.{name} must be a Cone, got {value!r}")
 
 
 NO_LIMITS = Limits()

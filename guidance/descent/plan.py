@@ -128,8 +128,8 @@ class Plan:
     def optimality_gap(self) -> float:
         """[kg] what the plan burns above the proved lower bound; nan without a flight or a bound.
 
-        The bound leaves out the limits on the path (altitude, glide slope, speed): where they bind, the gap
-        holds their price too. `certificate.scope` says which times of flight it covers.
+        The bound leaves out the altitude and the problem's `limits`: where they bind, the gap holds their
+        price too. `certificate.scope` says which times of flight it covers.
         """
         if self.status is not PlanStatus.OPTIMAL or self.certificate is None:
             return float("nan")

@@ -105,5 +105,8 @@ def _keeps_limits(problem: LandingProblem, path: PrimerPath, unit: float) -> boo
             return False
     if speed is not None and (path.velocity**2).sum(axis=1).max() > (speed / unit) ** 2:
         return False
+    final = problem.limits.final_thrust_direction
+    if final is not None and final.excess(path.direction[-1]) > 0.0:
+        return False
     across = np.hypot(position[:, 0], position[:, 1])
     return glide is None or bool((across * math.cos(glide) <= height * math.sin(glide)).all())

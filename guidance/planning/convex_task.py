@@ -13,7 +13,7 @@ from guidance.convex.constraint_set import ConstraintSet
 from guidance.convex.programme import ConvexSolution, convex_template
 from guidance.convex.scaling import scale_problem
 from guidance.descent.problem import LandingProblem
-from guidance.descent.residuals import FLIGHT_TOLERANCE, pointing_excess
+from guidance.descent.residuals import FLIGHT_TOLERANCE, final_thrust_excess, pointing_excess
 
 _THRUST_TOLERANCE = 5e-4  # relative; half of what a plan promises
 _DIP = FLIGHT_TOLERANCE.thrust_dip
@@ -96,7 +96,7 @@ def bounds_hold(problem: LandingProblem, solution: ConvexSolution, reference: Ar
 
 
 def relaxation_tight(problem: LandingProblem, solution: ConvexSolution) -> bool:
-    """Whether the thrust itself, not only its slack, keeps min_thrust and the pointing limit to 0.1 %.
+    """Whether the thrust itself, not only its slack, keeps min_thrust and its direction's limits to 0.1 %.
 
     It does wherever the convexification is lossless. It may not where the time of flight is fixed and too
     long, where the engine's least thrust exceeds the weight, or where the thrust turns round from one node to
@@ -110,6 +110,8 @@ def relaxation_tight(problem: LandingProblem, solution: ConvexSolution) -> bool:
         return False
     between = _least_between(acceleration) * np.exp(solution.log_mass[1:])
     if ratio > 0.0 and between.min() < ratio * (1.0 - _DIP):
+        return False
+    if final_thrust_excess(acceleration, problem, 1.0) > FLIGHT_TOLERANCE.pointing:
         return False
     return pointing_excess(acceleration, limit, 1.0) <= FLIGHT_TOLERANCE.pointing
 

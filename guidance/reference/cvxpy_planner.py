@@ -33,13 +33,14 @@ _LINEARISATIONS = 6
 _TIME_TOLERANCE = 2e-3  # relative; the optimum is flat in time
 
 
-class _Limits(NamedTuple):
+class _Structure(NamedTuple):
     """Which limits a problem has beyond the full thrust and the altitude."""
 
     min_thrust: bool
     pointing: bool
     glide_slope: bool
     speed: bool
+    final_thrust: bool = False
 
 
 class _Model(NamedTuple):
@@ -51,7 +52,7 @@ class _Model(NamedTuple):
 
 
 @lru_cache(maxsize=8)
-def _model(nodes: int, limits: _Limits) -> _Model:
+def _model(nodes: int, structure: _Structure) -> _Model:
     """Disciplined-parametrised problem of some nodes and limits."""
     import cvxpy as cp
 
@@ -72,6 +73,8 @@ def _model(nodes: int, limits: _Limits) -> _Model:
         "pointing": cp.Parameter(),
         "glide": cp.Parameter(nonneg=True),
         "speed": cp.Parameter(nonneg=True),
+        "final_axis": cp.Parameter(3),
+        "final_cosine": cp.Parameter(),
     }
     ones = np.ones((nodes - 1, 1))
     g_dt, g_dt2 = (cp.reshape(p[name], (1, 3), order="C") for name in ("g_dt", "g_dt2"))
@@ -88,15 +91,17 @@ def _model(nodes: int, limits: _Limits) -> _Model:
         cp.multiply(p["mass"], s) <= p["offset"] - z,
         r[1:-1, 2] >= 0,
     ]
-    if limits.min_thrust:
+    if structure.min_thrust:
         floor = cp.Variable(nodes)  # keeps each product to one parameter
         rules += [floor == p["offset"] - z, cp.multiply(p["mass"], s) >= p["ratio"] * floor]
-    if limits.pointing:
+    if structure.pointing:
         rules.append(u[:, 2] >= p["pointing"] * s)
-    if limits.glide_slope:
+    if structure.glide_slope:
         rules.append(cp.norm(r[:-1, :2], axis=1) <= p["glide"] * r[:-1, 2])
-    if limits.speed:
+    if structure.speed:
         rules.append(cp.norm(v, axis=1) <= p["speed"])
+    if structure.final_thrust:
+        rules.append(u[-1] @ p["final_axis"] >= p["final_cosine"] * s[-1])
     return _Model(cp.Problem(cp.Minimize(-z[-1]), rules), p, {"r": r, "v": v, "u": u, "z": z, "s": s})
 
 
@@ -105,12 +110,13 @@ def forget_models() -> None:
     _model.cache_clear()
 
 
-def _limits(problem: LandingProblem) -> _Limits:
-    return _Limits(
+def _structure(problem: LandingProblem) -> _Structure:
+    return _Structure(
         problem.lander.min_thrust > 0.0,
         problem.lander.pointing_limit is not None,
         problem.has_glide_slope,
         problem.speed_limit is not None,
+        problem.limits.final_thrust_direction is not None,
     )
 
 
@@ -138,7 +144,7 @@ def _solve_once(problem: LandingProblem, nodes: int, time: float, reference: Arr
     import cvxpy as cp
 
     units = Units.of(problem)
-    model, p, x = _model(nodes, _limits(problem))
+    model, p, x = _model(nodes, _structure(problem))
     dt = time / (nodes - 1) / units.time
     gravity = problem.gravity / units.acceleration
     p["r0"].value, p["v0"].value = problem.offset / units.length, problem.state.velocity / units.speed
@@ -151,6 +157,9 @@ def _solve_once(problem: LandingProblem, nodes: int, time: float, reference: Arr
     p["pointing"].value = math.cos(problem.lander.pointing_limit or math.pi)
     p["glide"].value = math.tan(problem.glide_slope_limit or 0.0)
     p["speed"].value = (problem.speed_bound or 0.0) / units.speed
+    final = problem.limits.final_thrust_direction
+    if final is not None:
+        p["final_axis"].value, p["final_cosine"].value = final.direction, math.cos(final.angle)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # of an inaccurate solution, which its status tells

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from guidance import Lander, Limits, State
+from guidance import Cone, Lander, Limits, State
 from guidance.convex import constraints
 from guidance.convex.condensed import CondensedLayout, burnt_mass, landing_moments
 from guidance.convex.layout import Layout
@@ -23,7 +23,7 @@ PROBLEM = LandingProblem(
     np.array([5.0, 5.0, 50.0]),
     LANDER,
     np.array([0.1, -0.2, -1.62]),
-    Limits(glide_slope=0.5, speed=40.0),
+    Limits(glide_slope=0.5, speed=40.0, final_thrust_direction=Cone(0.3, (0.6, 0.0, 0.8))),
     target_velocity=np.array([1.0, -2.0, -6.0]),
 )
 TIME = 20.0
@@ -138,6 +138,17 @@ def test_glide_slope_is_seen_from_the_landing_point():
         assert np.sign(round(rows.violation(x), 12)) == np.sign(change)
 
 
+@pytest.mark.parametrize("angle", [0.2, 1.4, 2.4])
+def test_final_thrust_direction_binds_the_last_node_alone(angle):
+    scaled = replace(SCALED, final_thrust=np.array([0.6, 0.0, 0.8, np.cos(angle)]))
+    rows = constraints.final_thrust_direction(LAYOUT, scaled)
+    for change in (-0.1, 0.0, 0.1):
+        lean = np.arctan2(0.6, 0.8) + angle + change  # in the plane of the axis
+        x = filled(acceleration=[0.0, 0.0, -0.5], slack=0.5)
+        x[LAYOUT.acceleration[-1]] = 0.5 * np.array([np.sin(lean), 0.0, np.cos(lean)])
+        assert np.sign(round(rows.violation(x), 12)) == np.sign(change)
+
+
 def test_speed_limit():
     def flying(speed):
         return filled(velocity=np.array([0.0, 0.6, -0.8]) * speed / (SCALED.acceleration * TIME))
@@ -230,12 +241,19 @@ def test_numbers_go_with_time_as_declared():
         constraints.max_thrust,
         constraints.min_thrust,
         constraints.pointing,
+        constraints.final_thrust_direction,
         constraints.glide_slope,
         constraints.speed_limit,
         constraints.dry_mass,
         constraints.landing_error_limit,
     ]
-    condensed: list[Family] = [burnt_mass, landing_moments, constraints.max_thrust, constraints.dry_mass]
+    condensed: list[Family] = [
+        burnt_mass,
+        landing_moments,
+        constraints.max_thrust,
+        constraints.final_thrust_direction,
+        constraints.dry_mass,
+    ]
     step = 1e-5
     for layout, families in ((FREE, whole), (CondensedLayout(NODES), condensed)):
         for family in families:

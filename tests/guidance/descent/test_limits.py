@@ -1,12 +1,16 @@
 """Limits as one value: what it refuses, and that the old keywords are shorthands of it."""
 
 import math
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from descents import GRAVITY, TARGET
+from hypothesis import given
+from hypothesis import strategies as st
 
-from guidance import PAPER_LANDER, Limits, State, solve_pdg
+from guidance import PAPER_LANDER, Cone, Limits, State, solve_pdg
 from guidance.descent.problem import LandingProblem
 
 START = [200.0, 100.0, 950.0, -8.0, -4.0, -30.0, 1200.0]
@@ -21,11 +25,40 @@ START = [200.0, 100.0, 950.0, -8.0, -4.0, -30.0, 1200.0]
         ({"speed": 0.0}, "limits.speed"),
         ({"speed": math.inf}, "limits.speed"),
         ({"speed": "fast"}, "limits.speed"),
+        ({"final_thrust_direction": 0.1}, "limits.final_thrust_direction"),
     ],
 )
 def test_what_nothing_can_keep_is_refused_by_its_name(given, name):
     with pytest.raises(ValueError, match=name):
         Limits(**given)
+
+
+@pytest.mark.parametrize(
+    ("angle", "axis", "name"),
+    [
+        (0.0, (0.0, 0.0, 1.0), "angle"),
+        (3.2, (0.0, 0.0, 1.0), "angle"),
+        (0.1, (0.0, 0.0, 0.0), "axis"),
+        (0.1, (0.0, 1.0), "axis"),
+        (0.1, (0.0, math.nan, 1.0), "axis"),
+    ],
+)
+def test_a_cone_needs_an_angle_and_a_direction(angle, axis, name):
+    with pytest.raises(ValueError, match=name):
+        Cone(angle, axis)
+
+
+@given(seed=st.integers(0, 1_000_000))
+def test_a_cone_measures_angles_from_its_axis(seed):
+    rng = np.random.default_rng(seed)
+    axis, aside = rng.normal(size=3), rng.normal(size=3)
+    axis, cone = axis / np.linalg.norm(axis), Cone(rng.uniform(0.01, 3.0), tuple(3.0 * axis))
+    aside -= (aside @ axis) * axis
+    aside /= np.linalg.norm(aside)
+    angle = rng.uniform(0.0, math.pi)
+    vector = rng.uniform(0.1, 1e4) * (math.cos(angle) * axis + math.sin(angle) * aside)
+    assert cone.excess(vector) == pytest.approx(max(0.0, angle - cone.angle), abs=1e-9)
+    assert cone.direction == pytest.approx(axis, abs=1e-15)
 
 
 def test_limits_are_given_by_name_only():
@@ -35,9 +68,9 @@ def test_limits_are_given_by_name_only():
 
 @pytest.mark.parametrize("name", ["glide_slope", "speed"])
 def test_a_limit_given_twice_is_refused_with_both_names(name):
-    given = {"limits": Limits(**{name: 1.0}), f"{name}_limit": 1.0}
+    twice: Any = {"limits": replace(Limits(), **{name: 1.0}), f"{name}_limit": 1.0}
     with pytest.raises(ValueError, match=rf"{name}_limit and limits\.{name} "):
-        solve_pdg(START, TARGET, **given)  # pyright: ignore[reportArgumentType]
+        solve_pdg(START, TARGET, **twice)
 
 
 def test_limits_must_be_limits():

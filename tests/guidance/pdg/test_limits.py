@@ -1,0 +1,81 @@
+"""Limits of the path beyond glide slope and speed: kept in flight, priced alike by independent methods."""
+
+import math
+
+import numpy as np
+import pytest
+from descents import COMPLETE, TARGET, paper_start
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from guidance import Cone, Lander, Limits, PlanStatus, solve_pdg
+from guidance.pdg.solve import PlanningMethod
+
+START = [200.0, 100.0, 950.0, -20.0, -4.0, -30.0, 1200.0]
+seeds = st.integers(0, 1_000_000)
+
+
+def planned(start, limits, method: PlanningMethod = "convex", **given):
+    plan = solve_pdg(start, TARGET, limits=limits, method=method, nodes=31, **given)
+    assert plan.status is PlanStatus.OPTIMAL
+    assert plan.keeps_limits
+    return plan
+
+
+@settings(max_examples=25)
+@given(seed=seeds)
+def test_the_last_thrust_points_where_it_is_asked_to(seed):
+    rng = np.random.default_rng(seed)
+    lean, bearing = rng.uniform(0.0, 0.6), rng.uniform(0.0, 2.0 * math.pi)
+    axis = (math.sin(lean) * math.cos(bearing), math.sin(lean) * math.sin(bearing), math.cos(lean))
+    start, angle = paper_start(rng), rng.uniform(0.02, 0.5)
+    free = planned(start, Limits())
+    wide, narrow = (
+        planned(start, Limits(final_thrust_direction=Cone(share * angle, axis))) for share in (1.0, 0.5)
+    )
+    for plan, share in ((wide, 1.0), (narrow, 0.5)):
+        last = plan.thrust[-1]
+        if np.linalg.norm(last) > 100.0:
+            assert math.acos(min(1.0, last @ axis / np.linalg.norm(last))) < share * angle + 1e-3
+    assert free.propellant - 0.01 < wide.propellant < narrow.propellant + 0.01
+
+
+@pytest.mark.parametrize("angle", [0.03, 0.06])
+def test_a_touchdown_upright_costs_the_same_by_every_method(angle):
+    limits = Limits(final_thrust_direction=Cone(angle))
+    plans = [planned(START, limits, method) for method in COMPLETE]
+    free = solve_pdg(START, TARGET, nodes=31)
+    assert math.atan2(math.hypot(*free.thrust[-1, :2]), free.thrust[-1, 2]) > angle + 0.02
+    for plan in plans:
+        assert plan.propellant == pytest.approx(plans[0].propellant, abs=0.01)
+        lean = math.atan2(math.hypot(*plan.thrust[-1, :2]), plan.thrust[-1, 2])
+        assert lean == pytest.approx(angle, abs=1e-3)
+    assert plans[0].method == "convex"
+    assert plans[0].propellant > free.propellant
+
+
+def test_the_indirect_flight_is_kept_where_it_ends_as_asked():
+    free = solve_pdg(START, TARGET)
+    kept = solve_pdg(START, TARGET, limits=Limits(final_thrust_direction=Cone(0.2)))
+    assert kept.method == free.method == "indirect"
+    assert kept.thrust.tobytes() == free.thrust.tobytes()
+    refused = solve_pdg(START, TARGET, limits=Limits(final_thrust_direction=Cone(0.02)))
+    assert refused.method == "convex"
+
+
+@pytest.mark.parametrize("time_of_flight", [None, 27.0])
+def test_a_final_direction_that_pointing_forbids_is_proved_to_be_the_cause(time_of_flight):
+    lander = Lander(min_thrust=1500.0, pointing_limit=0.5)
+    aside = Limits(final_thrust_direction=Cone(0.2, (1.0, 0.0, 0.2)))
+    plan = solve_pdg(START, TARGET, lander=lander, limits=aside, time_of_flight=time_of_flight, throw=False)
+    assert plan.status is PlanStatus.INFEASIBLE
+    assert plan.certificate is not None
+    assert plan.certificate.verified
+    assert {"final thrust direction", "pointing"} <= set(plan.certificate.causes)
+
+
+def test_the_lower_bound_leaves_limits_out_and_stays_below():
+    plan = planned(START, Limits(final_thrust_direction=Cone(0.02)))
+    assert plan.optimality_gap > 0.0
+    assert plan.certificate is not None
+    assert plan.certificate.verified
