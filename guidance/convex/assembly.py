@@ -82,12 +82,13 @@ def cones_of(rows: list[Rows]) -> tuple[tuple[str, int], ...]:
 
 def nominal_numbers(nodes: int) -> ScaledProblem:
     """Numbers of the size that a descent has; only the solver's internal scaling depends on them."""
+    tilted = Cone(1.0, (0.1, -0.2, 1.0))
     problem = LandingProblem(
         State(np.array([200.0, 100.0, 900.0]), np.array([-8.0, -4.0, -30.0]), 1200.0),
         np.zeros(3),
         Lander(min_thrust=1000.0, pointing_limit=1.0),
         np.array(MOON_GRAVITY),
-        Limits(glide_slope=1.0, speed=100.0, final_thrust_direction=Cone(0.5, (0.1, -0.2, 1.0))),
+        Limits(glide_slope=1.0, speed=100.0, final_thrust_direction=tilted, line_of_sight=tilted),
         target_velocity=np.array([2.0, 1.0, -5.0]),
     )
     return scale_problem(problem, 30.0, nodes)

@@ -67,7 +67,7 @@ class Branching:
         parts = []
         for branch, numbers in enumerate(scaled):
             aim = origin - numbers.position  # this target as seen from the first
-            shared = replace(numbers, position=origin)
+            shared = replace(numbers, position=origin, sight_apex=aim)
             for family in self.constraint_set.families:
                 part = family(self.layout, shared)
                 if family is constraints.landing:

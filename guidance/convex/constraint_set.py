@@ -28,6 +28,7 @@ class ConstraintSet:
         glide_slope: whether there is a glide slope limit below the horizon.
         speed_limit: whether the speed is limited.
         final_thrust_direction: whether the last thrust's direction is limited.
+        line_of_sight: whether the vehicle must stay within a cone from the target.
         free_landing_point: whether the landing point may move in the target's plane.
     """
 
@@ -37,6 +38,7 @@ class ConstraintSet:
     glide_slope: bool = False
     speed_limit: bool = False
     final_thrust_direction: bool = False
+    line_of_sight: bool = False
     free_landing_point: bool = False
 
     @classmethod
@@ -50,6 +52,7 @@ class ConstraintSet:
             glide_slope=problem.has_glide_slope,
             speed_limit=limits.speed is not None,
             final_thrust_direction=limits.final_thrust_direction is not None,
+            line_of_sight=limits.line_of_sight is not None,
             free_landing_point=free_landing_point,
         )
 
@@ -70,6 +73,7 @@ class ConstraintSet:
             (True, constraints.thrust_cone),
             (self.glide_slope, constraints.glide_slope),
             (self.speed_limit, constraints.speed_limit),
+            (self.line_of_sight, constraints.line_of_sight),
             (self.free_landing_point, constraints.landing_error),
         ]
         return [family for wanted, family in chosen if wanted]
@@ -77,7 +81,7 @@ class ConstraintSet:
     @property
     def can_condense(self) -> bool:
         """Whether the problem without its states says all but the altitude floor."""
-        return not (self.glide_slope or self.speed_limit or self.free_landing_point)
+        return not (self.glide_slope or self.speed_limit or self.line_of_sight or self.free_landing_point)
 
     @property
     def condensed_families(self) -> list[Family]:

@@ -186,6 +186,16 @@ def glide_slope(layout: Layout, scaled: ScaledProblem) -> Rows:
     return Rows("glide slope", "second_order", 3, bound=np.zeros(row.size), **entries)
 
 
+def line_of_sight(layout: Layout, scaled: ScaledProblem) -> Rows:
+    """Every node but the last lies in the cone about its axis from the target; a free landing point too."""
+    position = layout.position if layout.free_landing_point else layout.position[:-1]
+    row = np.arange(position.size).reshape(-1, 3)
+    rows, columns = np.broadcast_arrays(row[:, :, None], position[:, None, :])
+    entries = _stack((rows, columns, -scaled.sight))
+    bound = np.tile(-scaled.sight @ scaled.sight_apex, position.shape[0])
+    return Rows("line of sight", "second_order", 3, bound=bound, bound_rate=-2.0 * bound, **entries)
+
+
 def speed_limit(layout: Layout, scaled: ScaledProblem) -> Rows:
     """|velocity| <= limit at every node but the last."""
     velocity = layout.velocity[:-1]

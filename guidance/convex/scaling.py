@@ -58,6 +58,9 @@ class ScaledProblem:
         glide_angle: [rad] glide slope limit; pi/2 for none.
         speed_limit: greatest speed; 0 for none.
         final_thrust: axis of the final thrust's cone and the cosine of its angle, shape (4,); zeros for none.
+        sight: of the line of sight, rows sine of the angle times the axis, and cosine times two unit vectors
+            across, shape (3, 3); zeros for none.
+        sight_apex: where its cone stands, shape (3,).
         error_limit: greatest landing error where the landing point is free.
     """
 
@@ -75,6 +78,8 @@ class ScaledProblem:
     glide_angle: float = np.pi / 2
     speed_limit: float = 0.0
     final_thrust: Array = field(default_factory=lambda: np.zeros(4))
+    sight: Array = field(default_factory=lambda: np.zeros((3, 3)))
+    sight_apex: Array = field(default_factory=lambda: np.zeros(3))
     error_limit: float = 0.0
 
     @property
@@ -140,6 +145,12 @@ def _axis_and_cosine(cone: Cone | None) -> Array:
     return np.zeros(4) if cone is None else np.append(cone.direction, math.cos(cone.angle))
 
 
+def _cone_rows(cone: Cone | None) -> Array:
+    if cone is None:
+        return np.zeros((3, 3))
+    return np.vstack([math.sin(cone.angle) * cone.direction, math.cos(cone.angle) * cone.across])
+
+
 def scale_problem(
     problem: LandingProblem,
     time: float,
@@ -189,5 +200,6 @@ def scale_problem(
         glide_angle=np.pi / 2 if problem.glide_slope_limit is None else problem.glide_slope_limit,
         speed_limit=0.0 if speed is None else speed / (acceleration * time),
         final_thrust=_axis_and_cosine(problem.limits.final_thrust_direction),
+        sight=_cone_rows(problem.limits.line_of_sight),
         error_limit=_LOOSE if error_limit is None else error_limit / length,
     )

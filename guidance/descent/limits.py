@@ -41,6 +41,29 @@ class Cone:
         """The axis, shape (3,)."""
         return np.array(self.axis)
 
+    @property
+    def across(self) -> Array:
+        """Two unit vectors normal to the axis and to each other, shape (2, 3)."""
+        axis = self.direction
+        first = np.eye(3)[int(np.abs(axis).argmin())]
+        first = np.cross(np.cross(axis, first), axis)
+        first = first / np.linalg.norm(first)
+        return np.array([first, np.cross(axis, first)], dtype=np.float64)
+
+    def outside(self, points: Array) -> Array:
+        """[m] how far points seen from the apex, shape (..., 3), lie outside; at most zero inside.
+
+        That is their distance from the surface of a cone no wider than a right angle; behind it, less.
+        """
+        across = np.linalg.norm(points @ self.across.T, axis=-1)
+        return math.cos(self.angle) * across - math.sin(self.angle) * (points @ self.direction)
+
+    def on_surface(self, point: Array) -> Array:
+        """[m] shape (3,): the place on the surface nearest to a point outside it, not on the axis."""
+        aside = point - (point @ self.direction) * self.direction
+        normal = math.cos(self.angle) * aside / np.linalg.norm(aside) - math.sin(self.angle) * self.direction
+        return point - float(self.outside(point)) * normal
+
     def excess(self, vector: Array) -> float:
         """[rad] by how much a vector, shape (3,) and not zero, leaves the cone; 0 inside."""
         across = float(np.linalg.norm(np.cross(self.direction, vector)))
@@ -58,6 +81,8 @@ class Limits:
         final_thrust_direction: directions that the thrust may have at the end, which is the last node: a
             touchdown upright. Over the last interval the thrust turns into the cone, the faster the finer
             the mesh. A thrust of nothing has no direction.
+        line_of_sight: where the vehicle may be, as seen from the target; the angle is at most pi/2. With a
+            free landing point the cone still stands on the target, and holds the landing point too.
 
     Raises:
         ValueError: a limit is not finite, out of range, or not of its type.
@@ -66,6 +91,7 @@ class Limits:
     glide_slope: float | None = None
     speed: float | None = None
     final_thrust_direction: Cone | None = None
+    line_of_sight: Cone | None = None
 
     def __post_init__(self) -> None:
         """Refuse limits that nothing can keep."""
@@ -74,6 +100,9 @@ class Limits:
         if self.speed is not None:
             finite_number("limits.speed", self.speed, above=0.0)
         self._demand_cone("final_thrust_direction")
+        self._demand_cone("line_of_sight")
+        if self.line_of_sight is not None:
+            finite_number("limits.line_of_sight.angle", self.line_of_sight.angle, at_most=math.pi / 2)
 
     def _demand_cone(self, name: str) -> None:
         value = getattr(self, name)

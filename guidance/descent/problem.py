@@ -29,7 +29,8 @@ def lies_below(start: Array, target: Array) -> bool:
 class LandingProblem:
     """From `state` to `target` with the least propellant, never below the target's altitude.
 
-    A start that breaks the altitude, the glide slope or the speed limit by no more than `ROUNDING` keeps it.
+    A start that breaks the altitude, the glide slope, the line of sight or the speed limit by no more than
+    `ROUNDING` keeps it.
 
     Attributes:
         state: where the flight starts; its mass includes the propellant.
@@ -94,16 +95,21 @@ class LandingProblem:
     def offset(self) -> Array:
         """[m] shape (3,): the start as seen from the target.
 
-        One that breaks the altitude or the glide slope by no more than rounding is moved to keep it.
+        One that breaks the altitude, the glide slope or the line of sight by no more than rounding is moved
+        to keep it.
         """
         offset = self.state.position - self.target
         if offset[2] < 0.0:
             offset[2] = 0.0
         outside = self.outside_glide_slope(offset)
-        if 0.0 < outside <= ROUNDING * max(1.0, float(np.linalg.norm(offset))):
+        rounding = ROUNDING * max(1.0, float(np.linalg.norm(offset)))
+        if 0.0 < outside <= rounding:
             across, angle = math.hypot(offset[0], offset[1]), self.glide_slope_limit or 0.0
             offset[:2] *= 1.0 - outside * math.cos(angle) / across
             offset[2] += outside * math.sin(angle)
+        sight = self.limits.line_of_sight
+        if sight is not None and 0.0 < sight.outside(offset) <= rounding:
+            offset = sight.on_surface(offset)
         return offset
 
     def outside_glide_slope(self, vector: Array) -> float:

@@ -15,6 +15,7 @@ import numpy as np
 from guidance.arrays import Array
 from guidance.constants import MOON_GRAVITY
 from guidance.descent.flown_path import BETWEEN, distance_between, fly_thrust, length_of
+from guidance.descent.limits import Cone
 from guidance.descent.problem import LandingProblem
 from guidance.descent.trajectory import Trajectory
 from guidance.kernel import compile_kernel
@@ -30,7 +31,7 @@ class FlightTolerance:
     lengths and speeds are for the Moon and below, and grow with gravity above.
 
     Attributes:
-        position: [m] of `position` and `glide_slope`.
+        position: [m] of `position`, `glide_slope` and `line_of_sight`.
         velocity: [m/s] of `velocity` and `speed`.
         altitude: [m].
         thrust: of `thrust_above` and `thrust_below`, relative to max_thrust and min_thrust.
@@ -63,6 +64,7 @@ RESIDUAL_UNITS = {
     "pointing": "rad",
     "final_thrust_direction": "rad",
     "glide_slope": "m",
+    "line_of_sight": "m",
     "altitude": "m",
     "speed": "m/s",
     "propellant": "kg",
@@ -87,6 +89,7 @@ class Residuals:
         pointing: [rad] greatest excess over the pointing limit at nodes.
         final_thrust_direction: [rad] excess over that limit at the last node.
         glide_slope: [m] greatest horizontal distance outside the glide slope cone, flown, at nodes.
+        line_of_sight: [m] greatest distance outside that cone, flown, at nodes.
         altitude: [m] greatest depth below the target's altitude, or below a start that rounding puts beneath
             it, flown, at nodes and between.
         speed: [m/s] greatest excess over the speed limit, flown, at nodes.
@@ -106,6 +109,7 @@ class Residuals:
     pointing: float
     final_thrust_direction: float
     glide_slope: float
+    line_of_sight: float
     altitude: float
     speed: float
     propellant: float
@@ -128,6 +132,7 @@ class Residuals:
             "pointing": tolerance.pointing,
             "final_thrust_direction": tolerance.pointing,
             "glide_slope": tolerance.position * unit,
+            "line_of_sight": tolerance.position * unit,
             "altitude": tolerance.altitude * unit,
             "speed": tolerance.velocity * unit,
             "propellant": tolerance.propellant,
@@ -231,6 +236,10 @@ def _glide_excess(offset: Array, limit: float | None) -> float:
     return max(0.0, float(outside.max()))
 
 
+def _sight_excess(offset: Array, cone: Cone | None) -> float:
+    return 0.0 if cone is None else max(0.0, float(cone.outside(offset).max()))
+
+
 def fly_residuals(trajectory: Trajectory, problem: LandingProblem) -> Residuals:
     """Fly a plan's trajectory and measure it.
 
@@ -257,6 +266,7 @@ def fly_residuals(trajectory: Trajectory, problem: LandingProblem) -> Residuals:
         pointing=pointing_excess(trajectory.thrust, lander.pointing_limit, lander.max_thrust),
         final_thrust_direction=final_thrust_excess(trajectory.thrust, problem),
         glide_slope=_glide_excess(fine[::BETWEEN, :3] - end[:3], problem.glide_slope_limit),
+        line_of_sight=_sight_excess(fine[::BETWEEN, :3] - problem.target, problem.limits.line_of_sight),
         altitude=max(0.0, floor - found.lowest),
         speed=max(0.0, found.speed - limit),
         propellant=max(0.0, lander.dry_mass - float(end[6])),

@@ -108,5 +108,8 @@ def _keeps_limits(problem: LandingProblem, path: PrimerPath, unit: float) -> boo
     final = problem.limits.final_thrust_direction
     if final is not None and final.excess(path.direction[-1]) > 0.0:
         return False
+    sight = problem.limits.line_of_sight
+    if sight is not None and sight.outside(position).max() > 0.0:
+        return False
     across = np.hypot(position[:, 0], position[:, 1])
     return glide is None or bool((across * math.cos(glide) <= height * math.sin(glide)).all())

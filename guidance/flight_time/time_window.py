@@ -105,6 +105,11 @@ def _broken_at_ends(problem: LandingProblem, free_landing_point: bool) -> str:
     distance = float(np.linalg.norm(problem.offset))
     if outside > ROUNDING * max(1.0, distance) or problem.outside_glide_slope(-w) > still:
         return "glide slope"
+    sight = problem.limits.line_of_sight
+    if sight is not None:
+        leaves = not free_landing_point and sight.outside(-w) > still
+        if leaves or sight.outside(problem.offset) > ROUNDING * max(1.0, distance):
+            return "line of sight"
     arrival = min(0.0, float(w[2]))
     return _too_fast(problem) if _speed_at_contact_squared(problem) > arrival * arrival else ""
 

@@ -35,6 +35,8 @@ class PdgCommand:
         speed_limit: Greatest speed [m/s].
         final_thrust_limit_deg: Greatest angle of the last thrust from its axis [deg].
         final_thrust_axis: That axis x y z.
+        line_of_sight_limit_deg: Greatest angle of the vehicle from an axis, seen from the target [deg].
+        line_of_sight_axis: That axis x y z.
         time_of_flight: [s]; searched for unless given.
         nodes: Nodes of the plan.
         method: auto takes indirect where no limit binds, else convex; cvxpy and casadi are independent
@@ -56,6 +58,8 @@ class PdgCommand:
     speed_limit: float | None = None
     final_thrust_limit_deg: float | None = None
     final_thrust_axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    line_of_sight_limit_deg: float | None = None
+    line_of_sight_axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
     time_of_flight: float | None = None
     nodes: int = DEFAULT_NODES
     method: PlanningMethod = "auto"
@@ -70,6 +74,7 @@ class PdgCommand:
             glide_slope=None if glide is None else math.radians(glide),
             speed=self.speed_limit,
             final_thrust_direction=_cone(self.final_thrust_limit_deg, self.final_thrust_axis),
+            line_of_sight=_cone(self.line_of_sight_limit_deg, self.line_of_sight_axis),
         )
 
     def solve(self) -> Plan:

@@ -32,7 +32,16 @@ if TYPE_CHECKING:
 MOST_NODES = 1000
 """A plan that does not keep its limits on so many nodes is none."""
 
-_CURED_BY_NODES = ("position", "velocity", "altitude", "glide_slope", "speed", "thrust_above", "thrust_dip")
+_CURED_BY_NODES = (
+    "position",
+    "velocity",
+    "altitude",
+    "glide_slope",
+    "line_of_sight",
+    "speed",
+    "thrust_above",
+    "thrust_dip",
+)
 _OUT_OF_REACH = "the thrust and the propellant on board do not suffice for any flight to the target"
 _LOCAL_GAP = 2e-3  # of propellant, over the relaxed flight's: not worth another guess
 

@@ -47,6 +47,7 @@ def _parameters(
 ) -> dict[str, ArrayLike]:
     """Every number of a case by its name, scaled; a limit that is not set is not read."""
     lander, final = problem.lander, problem.limits.final_thrust_direction or Cone(math.pi)
+    sight = problem.limits.line_of_sight or Cone(math.pi / 2)
     least = lander.min_thrust / lander.max_thrust
     return {
         "position": problem.offset / units.length,
@@ -65,6 +66,8 @@ def _parameters(
         "high": times.high / units.time,
         "final_axis": final.axis,
         "final_cosine": math.cos(final.angle),
+        "sight_axis": sight.axis,
+        "sight_angle": sight.angle,
     }
 
 

@@ -41,6 +41,7 @@ class _Structure(NamedTuple):
     glide_slope: bool
     speed: bool
     final_thrust: bool = False
+    sight: bool = False
 
 
 class _Model(NamedTuple):
@@ -75,6 +76,8 @@ def _model(nodes: int, structure: _Structure) -> _Model:
         "speed": cp.Parameter(nonneg=True),
         "final_axis": cp.Parameter(3),
         "final_cosine": cp.Parameter(),
+        "sight_along": cp.Parameter(3),
+        "sight_across": cp.Parameter((3, 2)),
     }
     ones = np.ones((nodes - 1, 1))
     g_dt, g_dt2 = (cp.reshape(p[name], (1, 3), order="C") for name in ("g_dt", "g_dt2"))
@@ -102,6 +105,8 @@ def _model(nodes: int, structure: _Structure) -> _Model:
         rules.append(cp.norm(v, axis=1) <= p["speed"])
     if structure.final_thrust:
         rules.append(u[-1] @ p["final_axis"] >= p["final_cosine"] * s[-1])
+    if structure.sight:
+        rules.append(cp.norm(r[:-1] @ p["sight_across"], axis=1) <= r[:-1] @ p["sight_along"])
     return _Model(cp.Problem(cp.Minimize(-z[-1]), rules), p, {"r": r, "v": v, "u": u, "z": z, "s": s})
 
 
@@ -117,6 +122,7 @@ def _structure(problem: LandingProblem) -> _Structure:
         problem.has_glide_slope,
         problem.speed_limit is not None,
         problem.limits.final_thrust_direction is not None,
+        problem.limits.line_of_sight is not None,
     )
 
 
@@ -160,6 +166,10 @@ def _solve_once(problem: LandingProblem, nodes: int, time: float, reference: Arr
     final = problem.limits.final_thrust_direction
     if final is not None:
         p["final_axis"].value, p["final_cosine"].value = final.direction, math.cos(final.angle)
+    sight = problem.limits.line_of_sight
+    if sight is not None:
+        p["sight_along"].value = math.sin(sight.angle) * sight.direction
+        p["sight_across"].value = math.cos(sight.angle) * sight.across.T
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # of an inaccurate solution, which its status tells

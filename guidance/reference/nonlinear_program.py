@@ -45,6 +45,7 @@ class Structure:
         glide_slope: whether there is a glide slope limit below the horizon.
         speed: whether the speed is limited.
         final_thrust: whether the last thrust's direction is limited.
+        sight: whether the vehicle must stay within a cone from the target.
     """
 
     nodes: int
@@ -54,6 +55,7 @@ class Structure:
     glide_slope: bool
     speed: bool
     final_thrust: bool
+    sight: bool
 
     @classmethod
     def of(cls, problem: LandingProblem, nodes: int, free_time: bool) -> Structure:
@@ -67,6 +69,7 @@ class Structure:
             problem.has_glide_slope,
             problem.speed_limit is not None,
             problem.limits.final_thrust_direction is not None,
+            problem.limits.line_of_sight is not None,
         )
 
     @property
@@ -77,7 +80,8 @@ class Structure:
         fatrop fails too often: on half of the descents with a least thrust, on most with a glide slope limit
         of 20 degrees.
         """
-        limited = self.min_thrust or self.pointing or self.glide_slope or self.speed or self.final_thrust
+        limited = self.min_thrust or self.pointing or self.glide_slope or self.speed
+        limited = limited or self.final_thrust or self.sight
         return "ipopt" if limited or not fatrop_present() else "fatrop"
 
 
@@ -97,9 +101,10 @@ class _Stages:
     def __init__(self, ca: Any, structure: Structure) -> None:
         """State every stage."""
         self._ca, self._structure = ca, structure
-        vectors = dict.fromkeys(("position", "velocity", "target_velocity", "gravity", "final_axis"), 3)
+        names = ("position", "velocity", "target_velocity", "gravity", "final_axis", "sight_axis")
+        vectors = dict.fromkeys(names, 3)
         scalars = ("flow", "least_thrust", "least_midway", "dry", "smoothing", "pointing", "glide", "speed")
-        scalars += ("low", "high", "final_cosine")
+        scalars += ("low", "high", "final_cosine", "sight_angle")
         sizes = vectors | dict.fromkeys(scalars, 1)
         self.numbers = {name: ca.SX.sym(name, size) for name, size in sizes.items()}
         width = 11 if structure.free_time else 10
@@ -162,6 +167,10 @@ class _Stages:
         if self._structure.glide_slope and k < last:
             across = self._size(r[:2], _GLIDE_SMOOTHING)
             self._add(ca.sin(p["glide"]) * r[2] - ca.cos(p["glide"]) * across)
+        if self._structure.sight and k < last:
+            along = ca.dot(r, p["sight_axis"])
+            across = self._size(r - along * p["sight_axis"], _GLIDE_SMOOTHING)
+            self._add(ca.sin(p["sight_angle"]) * along - ca.cos(p["sight_angle"]) * across)
         if self._structure.speed:
             self._add(p["speed"] ** 2 - ca.sumsqr(v))
 
@@ -192,7 +201,7 @@ def nonlinear_program(structure: Structure, solver: NonlinearSolver) -> Nonlinea
         options |= {"structure_detection": "auto", "equality": [bool(e) for e in lower == upper]}
     else:
         # monotone takes half the iterations, and does not converge along a glide slope
-        strategy = "adaptive" if structure.glide_slope else "monotone"
+        strategy = "adaptive" if structure.glide_slope or structure.sight else "monotone"
         options |= {"ipopt.sb": "yes", "ipopt.mu_strategy": strategy}
     problem = {
         "x": stages.decision,

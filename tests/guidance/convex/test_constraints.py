@@ -23,7 +23,12 @@ PROBLEM = LandingProblem(
     np.array([5.0, 5.0, 50.0]),
     LANDER,
     np.array([0.1, -0.2, -1.62]),
-    Limits(glide_slope=0.5, speed=40.0, final_thrust_direction=Cone(0.3, (0.6, 0.0, 0.8))),
+    Limits(
+        glide_slope=0.5,
+        speed=40.0,
+        final_thrust_direction=Cone(0.3, (0.6, 0.0, 0.8)),
+        line_of_sight=Cone(0.8, (0.6, 0.0, 0.8)),
+    ),
     target_velocity=np.array([1.0, -2.0, -6.0]),
 )
 TIME = 20.0
@@ -149,6 +154,27 @@ def test_final_thrust_direction_binds_the_last_node_alone(angle):
         assert np.sign(round(rows.violation(x), 12)) == np.sign(change)
 
 
+def test_line_of_sight_is_seen_from_the_target():
+    cone, apex = Cone(0.5, (0.6, 0.0, 0.8)), np.array([0.2, -0.1, 0.05])
+    rows = np.vstack([np.sin(cone.angle) * cone.direction, np.cos(cone.angle) * cone.across])
+    scaled = replace(SCALED, sight=rows, sight_apex=apex)
+
+    def seen_at(angle, layout, node):
+        x = filled(layout, position=apex + 0.4 * cone.direction)
+        aside = np.cos(angle) * cone.direction + np.sin(angle) * cone.across[1]
+        x[layout.position[node]] = apex + 0.3 * aside
+        return x
+
+    for layout, nodes in ((LAYOUT, range(NODES - 1)), (FREE, range(NODES))):
+        family = constraints.line_of_sight(layout, scaled)
+        assert family.bound.size == 3 * len(nodes)
+        for node in nodes:
+            assert family.violation(seen_at(0.4, layout, node)) < 0.0
+            assert family.violation(seen_at(0.5, layout, node)) == pytest.approx(0.0, abs=1e-12)
+            outside = 0.3 * np.sin(0.1)  # the distance from the surface
+            assert family.violation(seen_at(0.6, layout, node)) == pytest.approx(outside)
+
+
 def test_speed_limit():
     def flying(speed):
         return filled(velocity=np.array([0.0, 0.6, -0.8]) * speed / (SCALED.acceleration * TIME))
@@ -242,6 +268,7 @@ def test_numbers_go_with_time_as_declared():
         constraints.min_thrust,
         constraints.pointing,
         constraints.final_thrust_direction,
+        constraints.line_of_sight,
         constraints.glide_slope,
         constraints.speed_limit,
         constraints.dry_mass,

@@ -26,6 +26,8 @@ START = [200.0, 100.0, 950.0, -8.0, -4.0, -30.0, 1200.0]
         ({"speed": math.inf}, "limits.speed"),
         ({"speed": "fast"}, "limits.speed"),
         ({"final_thrust_direction": 0.1}, "limits.final_thrust_direction"),
+        ({"line_of_sight": (0.1, (0.0, 0.0, 1.0))}, "limits.line_of_sight"),
+        ({"line_of_sight": Cone(1.6)}, "limits.line_of_sight.angle"),
     ],
 )
 def test_what_nothing_can_keep_is_refused_by_its_name(given, name):
@@ -59,6 +61,25 @@ def test_a_cone_measures_angles_from_its_axis(seed):
     vector = rng.uniform(0.1, 1e4) * (math.cos(angle) * axis + math.sin(angle) * aside)
     assert cone.excess(vector) == pytest.approx(max(0.0, angle - cone.angle), abs=1e-9)
     assert cone.direction == pytest.approx(axis, abs=1e-15)
+    frame = np.vstack([cone.across, cone.direction])
+    assert frame @ frame.T == pytest.approx(np.eye(3), abs=1e-14)
+
+
+@given(seed=st.integers(0, 1_000_000))
+def test_a_place_outside_a_cone_is_as_far_as_its_surface(seed):
+    rng = np.random.default_rng(seed)
+    cone = Cone(rng.uniform(0.05, 1.5), tuple(rng.normal(size=3)))
+    bearing, distance = rng.uniform(0.0, 2.0 * math.pi), rng.uniform(1.0, 1e3)
+    beyond = rng.uniform(0.0, 0.3)
+    aside = math.cos(bearing) * cone.across[0] + math.sin(bearing) * cone.across[1]
+    angle = cone.angle + beyond
+    point = distance * (math.cos(angle) * cone.direction + math.sin(angle) * aside)
+    assert cone.outside(point) == pytest.approx(distance * math.sin(beyond), abs=1e-9 * distance)
+    near = cone.on_surface(point)
+    assert np.linalg.norm(near - point) == pytest.approx(distance * math.sin(beyond), abs=1e-9 * distance)
+    assert cone.outside(near) == pytest.approx(0.0, abs=1e-9 * distance)
+    inner = distance * (math.cos(0.9 * cone.angle) * cone.direction + math.sin(0.9 * cone.angle) * aside)
+    assert cone.outside(inner) < 0.0
 
 
 def test_limits_are_given_by_name_only():

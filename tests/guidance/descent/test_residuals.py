@@ -31,6 +31,7 @@ def test_lengths_and_speeds_are_allowed_in_proportion_to_gravity_and_the_rest_al
         "pointing": 1e-3,
         "final_thrust_direction": 1e-3,
         "glide_slope": 0.5 * unit,
+        "line_of_sight": 0.5 * unit,
         "altitude": 0.2 * unit,
         "speed": 0.1 * unit,
         "propellant": 1e-3,

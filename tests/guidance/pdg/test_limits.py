@@ -1,6 +1,7 @@
 """Limits of the path beyond glide slope and speed: kept in flight, priced alike by independent methods."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -79,3 +80,73 @@ def test_the_lower_bound_leaves_limits_out_and_stays_below():
     assert plan.optimality_gap > 0.0
     assert plan.certificate is not None
     assert plan.certificate.verified
+
+
+@settings(max_examples=20)
+@given(seed=seeds)
+def test_an_upright_line_of_sight_is_the_glide_slope(seed):
+    rng = np.random.default_rng(seed)
+    start = paper_start(rng)
+    angle = math.atan2(math.hypot(*start[:2]), start[2] - TARGET[2]) + rng.uniform(0.002, 0.05)
+    slope = planned(start, Limits(glide_slope=angle))
+    sight = planned(start, Limits(line_of_sight=Cone(angle)))
+    assert sight.propellant == pytest.approx(slope.propellant, abs=0.01)
+    assert sight.residuals.line_of_sight < 0.02
+    free = planned(start, Limits())
+    assert free.propellant < sight.propellant + 0.01
+
+
+@settings(max_examples=25)
+@given(seed=seeds)
+def test_the_vehicle_stays_in_the_cone_that_leans(seed):
+    """The axis points at the start, turned a little; the flown path is measured by angles alone."""
+    rng = np.random.default_rng(seed)
+    start = paper_start(rng)
+    way = np.array(start[:3]) - TARGET
+    axis = way / np.linalg.norm(way) + rng.normal(0.0, 0.02, 3)
+    angle = rng.uniform(0.12, 0.3)
+    plan = planned(start, Limits(line_of_sight=Cone(angle, tuple(axis))))
+    seen = plan.position[:-1] - TARGET
+    cosine = seen @ axis / (np.linalg.norm(seen, axis=1) * np.linalg.norm(axis))
+    allowed = angle + 0.02 / np.linalg.norm(seen, axis=1)
+    assert (np.arccos(np.minimum(cosine, 1.0)) <= allowed).all()
+
+
+@pytest.mark.parametrize("angle", [0.03, 0.05])
+def test_a_line_of_sight_costs_the_same_by_every_method(angle):
+    start = [200.0, 100.0, 950.0, -25.0, -10.0, -25.0, 1200.0]
+    limits = Limits(line_of_sight=Cone(angle, (200.0, 100.0, 900.0)))
+    plans = [planned(start, limits, method) for method in COMPLETE]
+    for plan in plans:
+        assert plan.propellant == pytest.approx(plans[0].propellant, abs=0.02)
+    assert plans[0].propellant > planned(start, Limits()).propellant + 0.2
+
+
+def test_a_start_out_of_sight_is_told_without_a_solve_and_rounding_forgiven():
+    axis = np.array([200.0, 100.0, 900.0])
+    start = np.array(START)
+    start[:3] = TARGET + axis
+    cone = Cone(0.3, (200.0, 100.0, 600.0))
+    plan = solve_pdg(start, TARGET, limits=Limits(line_of_sight=replace(cone, angle=0.05)), throw=False)
+    assert plan.status is PlanStatus.INFEASIBLE
+    assert plan.certificate is not None
+    assert plan.certificate.causes == ("line of sight",)
+    assert plan.solves == 0
+    exact = math.acos(axis @ cone.direction / np.linalg.norm(axis))
+    for rounding in (0.0, 1e-9, 5e-7):
+        limits = Limits(line_of_sight=replace(cone, angle=exact - rounding))
+        planned([*start[:3], *(-0.03 * axis), 1200.0], limits)
+
+
+def test_a_free_landing_point_stays_in_sight_of_the_target():
+    """Out of reach, and the cone leans along the ground: the nearest landing point lies within it."""
+    start, target = [0.0, 0.0, 950.0, 0.0, 0.0, -30.0, 1200.0], np.array([3000.0, 0.0, 50.0])
+    cone = Cone(0.5, (-0.9, 0.3, 0.35))
+    plan = solve_pdg(
+        start, target, limits=Limits(line_of_sight=cone), method="convex", nodes=31, unreachable="nearest"
+    )
+    free = solve_pdg(start, target, method="convex", nodes=31, unreachable="nearest")
+    assert plan.status is free.status is PlanStatus.NEAREST
+    assert cone.outside(plan.position - target).max() < 0.05
+    assert plan.landing_error > free.landing_error - 0.1
+    assert plan.keeps_limits

@@ -53,7 +53,7 @@ def test_references_use_nothing_of_the_convex_solver(name):
 def test_cvxpy_model_is_disciplined_parametrised():
     from guidance.reference.cvxpy_planner import _model, _Structure
 
-    assert _model(11, _Structure(True, True, True, True, True)).problem.is_dcp(dpp=True)
+    assert _model(11, _Structure(*[True] * len(_Structure._fields))).problem.is_dcp(dpp=True)
 
 
 def test_references_count_their_solves_and_forget_on_demand():
