@@ -88,7 +88,13 @@ def nominal_numbers(nodes: int) -> ScaledProblem:
         np.zeros(3),
         Lander(min_thrust=1000.0, pointing_limit=1.0),
         np.array(MOON_GRAVITY),
-        Limits(glide_slope=1.0, speed=100.0, final_thrust_direction=tilted, line_of_sight=tilted),
+        Limits(
+            glide_slope=1.0,
+            speed=100.0,
+            final_thrust_direction=tilted,
+            line_of_sight=tilted,
+            thrust_rate=3000.0,
+        ),
         target_velocity=np.array([2.0, 1.0, -5.0]),
     )
     return scale_problem(problem, 30.0, nodes)

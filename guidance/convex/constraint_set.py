@@ -28,6 +28,7 @@ class ConstraintSet:
         glide_slope: whether there is a glide slope limit below the horizon.
         speed_limit: whether the speed is limited.
         final_thrust_direction: whether the last thrust's direction is limited.
+        thrust_rate: whether the change of the thrust is limited.
         line_of_sight: whether the vehicle must stay within a cone from the target.
         free_landing_point: whether the landing point may move in the target's plane.
     """
@@ -38,6 +39,7 @@ class ConstraintSet:
     glide_slope: bool = False
     speed_limit: bool = False
     final_thrust_direction: bool = False
+    thrust_rate: bool = False
     line_of_sight: bool = False
     free_landing_point: bool = False
 
@@ -52,6 +54,7 @@ class ConstraintSet:
             glide_slope=problem.has_glide_slope,
             speed_limit=limits.speed is not None,
             final_thrust_direction=limits.final_thrust_direction is not None,
+            thrust_rate=limits.thrust_rate is not None,
             line_of_sight=limits.line_of_sight is not None,
             free_landing_point=free_landing_point,
         )
@@ -71,6 +74,7 @@ class ConstraintSet:
             (True, constraints.dry_mass),
             (self.free_landing_point, constraints.landing_error_limit),
             (True, constraints.thrust_cone),
+            (self.thrust_rate, constraints.thrust_rate),
             (self.glide_slope, constraints.glide_slope),
             (self.speed_limit, constraints.speed_limit),
             (self.line_of_sight, constraints.line_of_sight),
@@ -95,5 +99,6 @@ class ConstraintSet:
             (self.final_thrust_direction, constraints.final_thrust_direction),
             (True, constraints.dry_mass),
             (True, constraints.thrust_cone),
+            (self.thrust_rate, constraints.thrust_rate),
         ]
         return [family for wanted, family in chosen if wanted]

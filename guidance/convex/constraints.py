@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from guidance.arrays import Array, Index
 from guidance.convex.layout import Layout
-from guidance.convex.scaling import ScaledProblem
+from guidance.convex.scaling import RateBounds, ScaledProblem
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,6 +170,23 @@ def final_thrust_direction(layout: Layout, scaled: ScaledProblem) -> Rows:
     value = scaled.final_thrust * np.array([-1.0, -1.0, -1.0, 1.0])
     row = np.zeros(4, dtype=np.int64)
     return Rows("final thrust direction", "nonnegative", 1, row, column, value, np.zeros(1))
+
+
+def thrust_rate(layout: Layout, scaled: ScaledProblem) -> Rows:
+    """The thrust changes from node to node by no more than a step, in the form of `scaled.thrust_rate`."""
+    intervals = layout.nodes - 1
+    free = RateBounds(np.ones(layout.nodes), np.ones(intervals), np.zeros(intervals))
+    bounds = scaled.thrust_rate or free
+    row, push = np.arange(intervals * 4).reshape(-1, 4), layout.acceleration
+    entries = _stack(
+        (row[:, 1:], push[1:], np.repeat(-bounds.weight[1:], 3).reshape(-1, 3)),
+        (row[:, 1:], push[:-1], np.repeat(bounds.weight[:-1], 3).reshape(-1, 3)),
+        (row[:, 0], layout.slack[1:], -bounds.eased),
+    )
+    bound = np.zeros(row.shape)
+    bound[:, 0] = bounds.step
+    step, power = bound.ravel(), np.repeat([0.0, 1.0], [6 * intervals, intervals])
+    return Rows("thrust rate", "second_order", 4, bound=step, value_power=power, bound_rate=step, **entries)
 
 
 def glide_slope(layout: Layout, scaled: ScaledProblem) -> Rows:

@@ -40,6 +40,23 @@ class MassBounds:
 
 
 @dataclass(frozen=True, eq=False)
+class RateBounds:
+    """Convex stand-in for |dT/dt| <= limit from node to node.
+
+        |weight[k + 1] u[k + 1] - weight[k] u[k]| <= step[k] + eased[k] s[k + 1]
+
+    Attributes:
+        weight: shape (N,); masses over the start mass, or ones.
+        step: shape (N - 1,).
+        eased: shape (N - 1,).
+    """
+
+    weight: Array
+    step: Array
+    eased: Array
+
+
+@dataclass(frozen=True, eq=False)
 class ScaledProblem:
     """A LandingProblem at one time of flight, in the units of the module docstring.
 
@@ -58,6 +75,7 @@ class ScaledProblem:
         glide_angle: [rad] glide slope limit; pi/2 for none.
         speed_limit: greatest speed; 0 for none.
         final_thrust: axis of the final thrust's cone and the cosine of its angle, shape (4,); zeros for none.
+        thrust_rate: bound on the change of the thrust.
         sight: of the line of sight, rows sine of the angle times the axis, and cosine times two unit vectors
             across, shape (3, 3); zeros for none.
         sight_apex: where its cone stands, shape (3,).
@@ -78,6 +96,7 @@ class ScaledProblem:
     glide_angle: float = np.pi / 2
     speed_limit: float = 0.0
     final_thrust: Array = field(default_factory=lambda: np.zeros(4))
+    thrust_rate: RateBounds | None = None
     sight: Array = field(default_factory=lambda: np.zeros((3, 3)))
     sight_apex: Array = field(default_factory=lambda: np.zeros(3))
     error_limit: float = 0.0
@@ -151,6 +170,26 @@ def _cone_rows(cone: Cone | None) -> Array:
     return np.vstack([math.sin(cone.angle) * cone.direction, math.cos(cone.angle) * cone.across])
 
 
+def rate_bounds(
+    problem: LandingProblem, time: float, nodes: int, log_mass: Array | None
+) -> RateBounds | None:
+    """Bounds on the change of the thrust from node to node; None without a limit.
+
+    With a reference ln(m / m_start) the thrust is its mass times the acceleration: what is wrong in the mass
+    is wrong in the rate. Without one no flight is excluded: m_k (u_{k+1} - u_k) is the change of the thrust
+    plus (m_k - m_{k+1}) u_{k+1}, where full thrust burns the most and the least mass is the lightest.
+    """
+    if problem.limits.thrust_rate is None:
+        return None
+    lander, intervals = problem.lander, nodes - 1
+    allowed = np.full(intervals, problem.limits.thrust_rate / lander.max_thrust * time / intervals)
+    if log_mass is not None:
+        return RateBounds(np.exp(log_mass), allowed, np.zeros(intervals))
+    lightest = np.exp(-least_log_mass(problem, time, nodes))
+    burnt = lander.max_mass_flow / problem.state.mass * time / intervals
+    return RateBounds(np.ones(nodes), lightest[:-1] * allowed, lightest[1:] * burnt)
+
+
 def scale_problem(
     problem: LandingProblem,
     time: float,
@@ -200,6 +239,7 @@ def scale_problem(
         glide_angle=np.pi / 2 if problem.glide_slope_limit is None else problem.glide_slope_limit,
         speed_limit=0.0 if speed is None else speed / (acceleration * time),
         final_thrust=_axis_and_cosine(problem.limits.final_thrust_direction),
+        thrust_rate=rate_bounds(problem, time, nodes, log_mass),
         sight=_cone_rows(problem.limits.line_of_sight),
         error_limit=_LOOSE if error_limit is None else error_limit / length,
     )

@@ -83,6 +83,8 @@ class Limits:
             the mesh. A thrust of nothing has no direction.
         line_of_sight: where the vehicle may be, as seen from the target; the angle is at most pi/2. With a
             free landing point the cone still stands on the target, and holds the landing point too.
+        thrust_rate: [N/s] greatest change of the thrust vector per second, in size and direction together,
+            from the first node to the last. The engine may start at any thrust, and is cut off at the end.
 
     Raises:
         ValueError: a limit is not finite, out of range, or not of its type.
@@ -92,6 +94,7 @@ class Limits:
     speed: float | None = None
     final_thrust_direction: Cone | None = None
     line_of_sight: Cone | None = None
+    thrust_rate: float | None = None
 
     def __post_init__(self) -> None:
         """Refuse limits that nothing can keep."""
@@ -99,6 +102,8 @@ class Limits:
             finite_number("limits.glide_slope", self.glide_slope, above=0.0, at_most=math.pi / 2)
         if self.speed is not None:
             finite_number("limits.speed", self.speed, above=0.0)
+        if self.thrust_rate is not None:
+            finite_number("limits.thrust_rate", self.thrust_rate, above=0.0)
         self._demand_cone("final_thrust_direction")
         self._demand_cone("line_of_sight")
         if self.line_of_sight is not None:

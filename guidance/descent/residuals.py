@@ -36,6 +36,7 @@ class FlightTolerance:
         altitude: [m].
         thrust: of `thrust_above` and `thrust_below`, relative to max_thrust and min_thrust.
         thrust_dip: of `thrust_dip`, relative to min_thrust.
+        thrust_rate: of `thrust_rate`, relative to the limit.
         pointing: [rad] of `pointing` and `final_thrust_direction`.
         propellant: [kg].
     """
@@ -45,6 +46,7 @@ class FlightTolerance:
     altitude: float = 0.2
     thrust: float = 1e-3
     thrust_dip: float = 0.04
+    thrust_rate: float = 0.01
     pointing: float = 1e-3
     propellant: float = 1e-3
 
@@ -61,6 +63,7 @@ RESIDUAL_UNITS = {
     "thrust_above": "N",
     "thrust_below": "N",
     "thrust_dip": "N",
+    "thrust_rate": "N/s",
     "pointing": "rad",
     "final_thrust_direction": "rad",
     "glide_slope": "m",
@@ -86,6 +89,7 @@ class Residuals:
         thrust_above: [N] greatest excess over max_thrust, at nodes and between.
         thrust_below: [N] greatest lack below min_thrust at nodes.
         thrust_dip: [N] the same between nodes, where a change of direction makes the thrust dip.
+        thrust_rate: [N/s] greatest excess of the thrust's change per second over its limit.
         pointing: [rad] greatest excess over the pointing limit at nodes.
         final_thrust_direction: [rad] excess over that limit at the last node.
         glide_slope: [m] greatest horizontal distance outside the glide slope cone, flown, at nodes.
@@ -106,6 +110,7 @@ class Residuals:
     thrust_above: float
     thrust_below: float
     thrust_dip: float
+    thrust_rate: float
     pointing: float
     final_thrust_direction: float
     glide_slope: float
@@ -129,6 +134,7 @@ class Residuals:
             "thrust_above": tolerance.thrust * lander.max_thrust,
             "thrust_below": max(tolerance.thrust * lander.min_thrust, 1e-9),
             "thrust_dip": max(tolerance.thrust_dip * lander.min_thrust, 1e-9),
+            "thrust_rate": tolerance.thrust_rate * (problem.limits.thrust_rate or math.inf),
             "pointing": tolerance.pointing,
             "final_thrust_direction": tolerance.pointing,
             "glide_slope": tolerance.position * unit,
@@ -229,6 +235,16 @@ def _least_burning(size: Array, max_thrust: float) -> float:
     return 1e-3 * max(float(size.max()), 1e-3 * max_thrust)
 
 
+def _rate_excess(thrust: Array, time: Array, limit: float | None) -> float:
+    """[N/s] of thrusts sampled within intervals; a jump between two of them counts as one sample's change."""
+    if limit is None:
+        return 0.0
+    part = np.diff(time) / (thrust.shape[1] - 1)
+    within = np.linalg.norm(np.diff(thrust, axis=1), axis=2) / part[:, None]
+    jumps = np.linalg.norm(thrust[1:, 0] - thrust[:-1, -1], axis=1) / part[1:]
+    return max(0.0, float(within.max()) - limit, float(jumps.max()) - limit)
+
+
 def _glide_excess(offset: Array, limit: float | None) -> float:
     if limit is None or limit >= math.pi / 2 - 1e-6:
         return 0.0
@@ -263,6 +279,7 @@ def fly_residuals(trajectory: Trajectory, problem: LandingProblem) -> Residuals:
         thrust_above=max(0.0, found.greatest_thrust - lander.max_thrust),
         thrust_below=max(0.0, lander.min_thrust - found.least_thrust),
         thrust_dip=max(0.0, lander.min_thrust - found.least_between),
+        thrust_rate=_rate_excess(thrust, trajectory.time, problem.limits.thrust_rate),
         pointing=pointing_excess(trajectory.thrust, lander.pointing_limit, lander.max_thrust),
         final_thrust_direction=final_thrust_excess(trajectory.thrust, problem),
         glide_slope=_glide_excess(fine[::BETWEEN, :3] - end[:3], problem.glide_slope_limit),

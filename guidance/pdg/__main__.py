@@ -37,6 +37,7 @@ class PdgCommand:
         final_thrust_axis: That axis x y z.
         line_of_sight_limit_deg: Greatest angle of the vehicle from an axis, seen from the target [deg].
         line_of_sight_axis: That axis x y z.
+        thrust_rate_limit: Greatest change of the thrust vector [N/s].
         time_of_flight: [s]; searched for unless given.
         nodes: Nodes of the plan.
         method: auto takes indirect where no limit binds, else convex; cvxpy and casadi are independent
@@ -60,6 +61,7 @@ class PdgCommand:
     final_thrust_axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
     line_of_sight_limit_deg: float | None = None
     line_of_sight_axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    thrust_rate_limit: float | None = None
     time_of_flight: float | None = None
     nodes: int = DEFAULT_NODES
     method: PlanningMethod = "auto"
@@ -75,6 +77,7 @@ class PdgCommand:
             speed=self.speed_limit,
             final_thrust_direction=_cone(self.final_thrust_limit_deg, self.final_thrust_axis),
             line_of_sight=_cone(self.line_of_sight_limit_deg, self.line_of_sight_axis),
+            thrust_rate=self.thrust_rate_limit,
         )
 
     def solve(self) -> Plan:

@@ -32,16 +32,7 @@ if TYPE_CHECKING:
 MOST_NODES = 1000
 """A plan that does not keep its limits on so many nodes is none."""
 
-_CURED_BY_NODES = (
-    "position",
-    "velocity",
-    "altitude",
-    "glide_slope",
-    "line_of_sight",
-    "speed",
-    "thrust_above",
-    "thrust_dip",
-)
+_NOT_CURED_BY_NODES = ("thrust_below", "pointing", "final_thrust_direction", "propellant")
 _OUT_OF_REACH = "the thrust and the propellant on board do not suffice for any flight to the target"
 _LOCAL_GAP = 2e-3  # of propellant, over the relaxed flight's: not worth another guess
 
@@ -244,7 +235,7 @@ def within_limits(plan: Plan, plan_again: Callable[[int, Plan], Plan]) -> Plan:
         # a relaxed thrust that turns round does so within one interval of any mesh
         turns = worst == "thrust_dip" and plan.method != "casadi"
         stalls = stalls + 1 if excess[worst] > 0.7 * before else 0
-        if finer > MOST_NODES or turns or worst not in _CURED_BY_NODES or stalls == 2:
+        if finer > MOST_NODES or turns or worst in _NOT_CURED_BY_NODES or stalls == 2:
             return missed
         before = excess[worst]
         again = plan_again(finer, plan)

@@ -68,6 +68,7 @@ def _parameters(
         "final_cosine": math.cos(final.angle),
         "sight_axis": sight.axis,
         "sight_angle": sight.angle,
+        "rate": (problem.limits.thrust_rate or 0.0) / lander.max_thrust * units.time,
     }
 
 

@@ -30,6 +30,8 @@ from guidance.reference.units import Units
 
 METHOD = "cvxpy"
 _LINEARISATIONS = 6
+_SETTLED = 2e-4  # greatest square of a change of ln(mass), in which the thrust bounds are wrong by half of it
+_SETTLED_RATE = 1e-5  # the same, where its root is wrong in the rate of the thrust
 _TIME_TOLERANCE = 2e-3  # relative; the optimum is flat in time
 
 
@@ -42,6 +44,7 @@ class _Structure(NamedTuple):
     speed: bool
     final_thrust: bool = False
     sight: bool = False
+    rate: bool = False
 
 
 class _Model(NamedTuple):
@@ -78,6 +81,7 @@ def _model(nodes: int, structure: _Structure) -> _Model:
         "final_cosine": cp.Parameter(),
         "sight_along": cp.Parameter(3),
         "sight_across": cp.Parameter((3, 2)),
+        "thrust_step": cp.Parameter(nonneg=True),
     }
     ones = np.ones((nodes - 1, 1))
     g_dt, g_dt2 = (cp.reshape(p[name], (1, 3), order="C") for name in ("g_dt", "g_dt2"))
@@ -107,6 +111,9 @@ def _model(nodes: int, structure: _Structure) -> _Model:
         rules.append(u[-1] @ p["final_axis"] >= p["final_cosine"] * s[-1])
     if structure.sight:
         rules.append(cp.norm(r[:-1] @ p["sight_across"], axis=1) <= r[:-1] @ p["sight_along"])
+    if structure.rate:
+        thrust = cp.multiply(cp.reshape(p["mass"], (nodes, 1), order="C") @ np.ones((1, 3)), u)
+        rules.append(cp.norm(thrust[1:] - thrust[:-1], axis=1) <= p["thrust_step"])
     return _Model(cp.Problem(cp.Minimize(-z[-1]), rules), p, {"r": r, "v": v, "u": u, "z": z, "s": s})
 
 
@@ -123,6 +130,7 @@ def _structure(problem: LandingProblem) -> _Structure:
         problem.speed_limit is not None,
         problem.limits.final_thrust_direction is not None,
         problem.limits.line_of_sight is not None,
+        problem.limits.thrust_rate is not None,
     )
 
 
@@ -170,6 +178,7 @@ def _solve_once(problem: LandingProblem, nodes: int, time: float, reference: Arr
     if sight is not None:
         p["sight_along"].value = math.sin(sight.angle) * sight.direction
         p["sight_across"].value = math.cos(sight.angle) * sight.across.T
+    p["thrust_step"].value = (problem.limits.thrust_rate or 0.0) / problem.lander.max_thrust * dt * units.time
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # of an inaccurate solution, which its status tells
@@ -195,9 +204,10 @@ def _solve_once(problem: LandingProblem, nodes: int, time: float, reference: Arr
 def _solve_time(problem: LandingProblem, nodes: int, time: float) -> _Flight:
     """Linearise about the last answer until it no longer moves."""
     reference = np.linspace(0.0, -0.5 * problem.log_mass_ratio, nodes)
+    settled = _SETTLED if problem.limits.thrust_rate is None else _SETTLED_RATE
     flight = _solve_once(problem, nodes, time, reference)
     for solves in range(1, _LINEARISATIONS + 1):
-        if not flight.log_mass.size or float(np.max((flight.log_mass - reference) ** 2)) < 2e-4:
+        if not flight.log_mass.size or float(np.max((flight.log_mass - reference) ** 2)) < settled:
             break
         reference = flight.log_mass
         flight = replace(_solve_once(problem, nodes, time, reference), solves=solves + 1)

@@ -46,6 +46,7 @@ class Structure:
         speed: whether the speed is limited.
         final_thrust: whether the last thrust's direction is limited.
         sight: whether the vehicle must stay within a cone from the target.
+        rate: whether the change of the thrust is limited.
     """
 
     nodes: int
@@ -56,6 +57,7 @@ class Structure:
     speed: bool
     final_thrust: bool
     sight: bool
+    rate: bool
 
     @classmethod
     def of(cls, problem: LandingProblem, nodes: int, free_time: bool) -> Structure:
@@ -70,6 +72,7 @@ class Structure:
             problem.speed_limit is not None,
             problem.limits.final_thrust_direction is not None,
             problem.limits.line_of_sight is not None,
+            problem.limits.thrust_rate is not None,
         )
 
     @property
@@ -81,7 +84,7 @@ class Structure:
         of 20 degrees.
         """
         limited = self.min_thrust or self.pointing or self.glide_slope or self.speed
-        limited = limited or self.final_thrust or self.sight
+        limited = limited or self.final_thrust or self.sight or self.rate
         return "ipopt" if limited or not fatrop_present() else "fatrop"
 
 
@@ -104,7 +107,7 @@ class _Stages:
         names = ("position", "velocity", "target_velocity", "gravity", "final_axis", "sight_axis")
         vectors = dict.fromkeys(names, 3)
         scalars = ("flow", "least_thrust", "least_midway", "dry", "smoothing", "pointing", "glide", "speed")
-        scalars += ("low", "high", "final_cosine", "sight_angle")
+        scalars += ("low", "high", "final_cosine", "sight_angle", "rate")
         sizes = vectors | dict.fromkeys(scalars, 1)
         self.numbers = {name: ca.SX.sym(name, size) for name, size in sizes.items()}
         width = 11 if structure.free_time else 10
@@ -149,6 +152,9 @@ class _Stages:
         self._add(ca.exp(z - 0.5 * burnt) * middle - p["least_midway"])
         if self._structure.min_thrust:  # midway alone lets a strong thrust turn round into a weak one
             self._add(ca.dot(u, w) - _GREATEST_TURN * self._size(u) * self._size(w))
+
+        if self._structure.rate:
+            self._add((p["rate"] * h) ** 2 - ca.sumsqr(ca.exp(z - burnt) * w - ca.exp(z) * u))
 
     def _state_limits(self, k: int) -> None:
         x, p, ca, last = self.states[k], self.numbers, self._ca, self._structure.nodes - 1

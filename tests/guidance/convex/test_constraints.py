@@ -4,6 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given, reject
+from hypothesis import strategies as st
 
 from guidance import Cone, Lander, Limits, State
 from guidance.convex import constraints
@@ -28,6 +30,7 @@ PROBLEM = LandingProblem(
         speed=40.0,
         final_thrust_direction=Cone(0.3, (0.6, 0.0, 0.8)),
         line_of_sight=Cone(0.8, (0.6, 0.0, 0.8)),
+        thrust_rate=900.0,
     ),
     target_velocity=np.array([1.0, -2.0, -6.0]),
 )
@@ -154,6 +157,47 @@ def test_final_thrust_direction_binds_the_last_node_alone(angle):
         assert np.sign(round(rows.violation(x), 12)) == np.sign(change)
 
 
+def test_the_rate_of_the_thrust_in_newtons_a_second():
+    """Linearised at its own mass, the rows' violation is what the thrust of a node exceeds."""
+    limited = replace(PROBLEM, limits=Limits(thrust_rate=900.0))
+    log_mass, step = np.linspace(0.0, -0.04, NODES), TIME / (NODES - 1)
+    mass = PROBLEM.state.mass * np.exp(log_mass)
+    scaled = scale_problem(limited, TIME, NODES, log_mass)
+    thrust = 3000.0 + np.array([0.0, 1.0, 0.0, -1.0, -2.0, -1.0, 0.0])[:, None] * 900.0 * step * np.eye(3)[2]
+    for axis, change in ((0, 0.0), (1, 240.0)):
+        moved = thrust.copy()
+        moved[2, axis] += change
+        rows = constraints.thrust_rate(LAYOUT, scaled)
+        x = filled(acceleration=moved / mass[:, None] / scaled.acceleration)
+        excess = rows.violation(x) * LANDER.max_thrust
+        expected = np.linalg.norm(np.diff(moved, axis=0), axis=1).max() - 900.0 * step
+        assert excess == pytest.approx(expected, abs=1e-6)
+
+
+@given(seed=st.integers(0, 1_000_000))
+def test_the_relaxed_rate_of_the_thrust_excludes_no_flight(seed):
+    """Any thrust within the bounds, and the greatest rate that it has from node to node."""
+    rng = np.random.default_rng(seed)
+    time, mass = rng.uniform(5.0, 60.0), np.empty(NODES)
+    free = Lander(
+        dry_mass=700.0, max_thrust=rng.uniform(4e3, 4e4), specific_impulse=rng.uniform(150.0, 450.0)
+    )
+    step, push = time / (NODES - 1), rng.normal(size=(NODES, 3))
+    thrust = rng.uniform(0.0, free.max_thrust, NODES)[:, None] * push / np.linalg.norm(push, axis=1)[:, None]
+    mass[0] = PROBLEM.state.mass
+    for k in range(NODES - 1):  # trapezoidal in ln(mass), as the mesh burns it
+        size = np.linalg.norm(thrust[k : k + 2], axis=1)
+        mass[k + 1] = mass[k] * np.exp(-0.5 * step * size.sum() / mass[k] / free.exhaust_velocity)
+    if mass[-1] <= free.dry_mass:
+        reject()
+    rate = np.linalg.norm(np.diff(thrust, axis=0), axis=1).max() / step
+    problem = replace(PROBLEM, lander=free, limits=Limits(thrust_rate=float(rate)))
+    scaled = scale_problem(problem, time, NODES)
+    push = thrust / mass[:, None] / scaled.acceleration
+    x = filled(acceleration=push, slack=np.linalg.norm(push, axis=1))
+    assert constraints.thrust_rate(LAYOUT, scaled).violation(x) <= 1e-12
+
+
 def test_line_of_sight_is_seen_from_the_target():
     cone, apex = Cone(0.5, (0.6, 0.0, 0.8)), np.array([0.2, -0.1, 0.05])
     rows = np.vstack([np.sin(cone.angle) * cone.direction, np.cos(cone.angle) * cone.across])
@@ -269,6 +313,7 @@ def test_numbers_go_with_time_as_declared():
         constraints.pointing,
         constraints.final_thrust_direction,
         constraints.line_of_sight,
+        constraints.thrust_rate,
         constraints.glide_slope,
         constraints.speed_limit,
         constraints.dry_mass,

@@ -25,6 +25,8 @@ START = [200.0, 100.0, 950.0, -8.0, -4.0, -30.0, 1200.0]
         ({"speed": 0.0}, "limits.speed"),
         ({"speed": math.inf}, "limits.speed"),
         ({"speed": "fast"}, "limits.speed"),
+        ({"thrust_rate": 0.0}, "limits.thrust_rate"),
+        ({"thrust_rate": math.inf}, "limits.thrust_rate"),
         ({"final_thrust_direction": 0.1}, "limits.final_thrust_direction"),
         ({"line_of_sight": (0.1, (0.0, 0.0, 1.0))}, "limits.line_of_sight"),
         ({"line_of_sight": Cone(1.6)}, "limits.line_of_sight.angle"),

@@ -5,12 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from descents import COMPLETE, TARGET, paper_start
+from descents import COMPLETE, GRAVITY, TARGET, paper_start
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from guidance import Cone, Lander, Limits, PlanStatus, solve_pdg
+from guidance import Cone, Lander, Limits, PlanStatus, State, solve_pdg
+from guidance.descent.problem import LandingProblem
 from guidance.pdg.solve import PlanningMethod
+from guidance.planning.deferred_decision import plan_deferred
 
 START = [200.0, 100.0, 950.0, -20.0, -4.0, -30.0, 1200.0]
 seeds = st.integers(0, 1_000_000)
@@ -150,3 +152,67 @@ def test_a_free_landing_point_stays_in_sight_of_the_target():
     assert cone.outside(plan.position - target).max() < 0.05
     assert plan.landing_error > free.landing_error - 0.1
     assert plan.keeps_limits
+
+
+@settings(max_examples=25)
+@given(seed=seeds)
+def test_the_thrust_changes_no_faster_than_it_may(seed):
+    """Sampled through `thrust_at`: size and direction of the vector together."""
+    rng = np.random.default_rng(seed)
+    start, slow = paper_start(rng), rng.uniform(800.0, 3000.0)
+    rates = (None, 2.0 * slow, slow)
+    free, wide, narrow = (planned(start, Limits(thrust_rate=rate)) for rate in rates)
+    for plan, rate in ((wide, 2.0 * slow), (narrow, slow)):
+        times = np.linspace(0.0, plan.time_of_flight, 1501)
+        change = np.linalg.norm(np.diff(plan.thrust_at(times), axis=0), axis=1) / times[1]
+        assert change.max() < 1.01 * rate
+        assert np.abs(np.diff(np.linalg.norm(plan.thrust_at(times), axis=1))).max() < 1.01 * rate * times[1]
+    assert free.propellant - 0.01 < wide.propellant < narrow.propellant + 0.01
+
+
+@pytest.mark.parametrize("lander", [Lander(), Lander(min_thrust=1200.0)], ids=["coasting", "burning"])
+def test_a_thrust_rate_costs_the_same_by_every_method(lander):
+    start = [200.0, 100.0, 950.0, -25.0, -10.0, -25.0, 1200.0]
+    limits = Limits(thrust_rate=1000.0)
+    plans = [planned(start, limits, method, lander=lander) for method in COMPLETE]
+    for plan in plans:
+        assert plan.propellant == pytest.approx(plans[0].propellant, abs=0.02)
+    assert plans[0].method == "convex"
+    assert plans[0].propellant > planned(start, Limits(), lander=lander).propellant + 0.3
+
+
+@pytest.mark.parametrize(("time_of_flight", "rate"), [(None, 10.0), (27.0, 150.0)])
+def test_a_thrust_too_sluggish_to_land_is_proved_to_be_the_cause(time_of_flight, rate):
+    plan = solve_pdg(
+        START, TARGET, limits=Limits(thrust_rate=rate), time_of_flight=time_of_flight, throw=False
+    )
+    assert plan.status is PlanStatus.INFEASIBLE
+    assert plan.certificate is not None
+    assert plan.certificate.verified
+    assert "thrust rate" in plan.certificate.causes
+
+
+def test_all_limits_at_once_by_two_methods():
+    limits = Limits(
+        glide_slope=0.35,
+        speed=60.0,
+        final_thrust_direction=Cone(0.05),
+        line_of_sight=Cone(0.2, (200.0, 100.0, 900.0)),
+        thrust_rate=2000.0,
+    )
+    lander = Lander(min_thrust=1000.0, pointing_limit=0.9)
+    plans = [planned(START, limits, method, lander=lander) for method in ("convex", "casadi")]
+    assert plans[0].method == "convex"
+    assert plans[1].propellant == pytest.approx(plans[0].propellant, abs=0.03)
+
+
+def test_branches_of_a_deferred_decision_keep_the_limits():
+    limits = Limits(thrust_rate=2500.0, line_of_sight=Cone(0.5), final_thrust_direction=Cone(0.05))
+    problem = LandingProblem(State.parse(START), TARGET, Lander(), GRAVITY, limits)
+    sites = TARGET + np.array([[0.0, 0.0, 0.0], [30.0, -20.0, 0.0], [-10.0, 40.0, 0.0]])
+    decision = plan_deferred(problem, sites, budget=2.0, time_of_flight=30.0, nodes=31)
+    assert len(decision.plans) == 3
+    assert decision.shared_nodes > 3
+    for plan in decision.plans:
+        assert plan.keeps_limits
+        assert plan.residuals.line_of_sight < 0.02
