@@ -96,6 +96,7 @@ def nominal_numbers(nodes: int) -> ScaledProblem:
             thrust_rate=3000.0,
         ),
         target_velocity=np.array([2.0, 1.0, -5.0]),
+        angular_velocity=np.array([1e-3, -2e-3, 3e-3]),
     )
     return scale_problem(problem, 30.0, nodes)
 

@@ -11,6 +11,7 @@ import numpy as np
 from guidance.convex import constraints
 from guidance.convex.condensed import burnt_mass, landing_moments
 from guidance.convex.constraints import Rows
+from guidance.convex.rotating_motion import rotating_motion
 from guidance.convex.scaling import ScaledProblem
 from guidance.descent.problem import LandingProblem
 
@@ -30,6 +31,7 @@ class ConstraintSet:
         final_thrust_direction: whether the last thrust's direction is limited.
         thrust_rate: whether the change of the thrust is limited.
         line_of_sight: whether the vehicle must stay within a cone from the target.
+        rotates: whether the frame turns.
         free_landing_point: whether the landing point may move in the target's plane.
     """
 
@@ -41,6 +43,7 @@ class ConstraintSet:
     final_thrust_direction: bool = False
     thrust_rate: bool = False
     line_of_sight: bool = False
+    rotates: bool = False
     free_landing_point: bool = False
 
     @classmethod
@@ -56,6 +59,7 @@ class ConstraintSet:
             final_thrust_direction=limits.final_thrust_direction is not None,
             thrust_rate=limits.thrust_rate is not None,
             line_of_sight=limits.line_of_sight is not None,
+            rotates=problem.rotates,
             free_landing_point=free_landing_point,
         )
 
@@ -64,7 +68,8 @@ class ConstraintSet:
         """Constraint functions in row order."""
         chosen: list[tuple[bool, Family]] = [
             (True, constraints.start),
-            (True, constraints.motion),
+            (not self.rotates, constraints.motion),
+            (self.rotates, rotating_motion),
             (True, constraints.landing),
             (True, constraints.max_thrust),
             (self.min_thrust, constraints.min_thrust),
@@ -85,7 +90,8 @@ class ConstraintSet:
     @property
     def can_condense(self) -> bool:
         """Whether the problem without its states says all but the altitude floor."""
-        return not (self.glide_slope or self.speed_limit or self.line_of_sight or self.free_landing_point)
+        on_path = self.glide_slope or self.speed_limit or self.line_of_sight
+        return not (on_path or self.rotates or self.free_landing_point)
 
     @property
     def condensed_families(self) -> list[Family]:

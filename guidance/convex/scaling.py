@@ -68,7 +68,7 @@ class ScaledProblem:
         position: start position from the target, shape (3,).
         velocity: start velocity, shape (3,).
         target_velocity: velocity at the landing point, shape (3,).
-        gravity: shape (3,).
+        gravity: at the target, shape (3,).
         mass_bounds: affine thrust bounds.
         propellant: greatest allowed -zeta at the end.
         pointing_cosine: cosine of the pointing limit; -1 for none.
@@ -79,6 +79,7 @@ class ScaledProblem:
         sight: of the line of sight, rows sine of the angle times the axis, and cosine times two unit vectors
             across, shape (3, 3); zeros for none.
         sight_apex: where its cone stands, shape (3,).
+        rotation: [rad] of the frame during the flight, shape (3,).
         error_limit: greatest landing error where the landing point is free.
     """
 
@@ -99,6 +100,7 @@ class ScaledProblem:
     thrust_rate: RateBounds | None = None
     sight: Array = field(default_factory=lambda: np.zeros((3, 3)))
     sight_apex: Array = field(default_factory=lambda: np.zeros(3))
+    rotation: Array = field(default_factory=lambda: np.zeros(3))
     error_limit: float = 0.0
 
     @property
@@ -110,14 +112,16 @@ class ScaledProblem:
     def unknown_bound(self) -> float:
         """Bound on every scaled unknown of any flight within the thrust bounds (for certificates).
 
-        All are reached from the start: the velocity at the end too, whatever is asked for.
+        All are reached from the start: the velocity at the end too, whatever is asked for. In a frame that
+        turns by an angle A the velocity against the stars, v + A x r, grows as it does in one at rest.
         """
+        turn, far = float(np.linalg.norm(self.rotation)), float(np.linalg.norm(self.position))
         gravity = float(np.linalg.norm(self.gravity))
         slack = float(
             np.max(self.mass_bounds.upper_bound + np.abs(self.mass_bounds.upper_slope) * self.propellant)
         )
-        speed = float(np.linalg.norm(self.velocity)) + gravity + slack
-        return 1.0 + float(np.linalg.norm(self.position)) + speed
+        speed = float(np.linalg.norm(self.velocity)) + turn * far + gravity + slack
+        return (1.0 + far + speed) * (1.0 + turn)
 
 
 def least_log_mass(problem: LandingProblem, time: float, nodes: int) -> Array:
@@ -232,7 +236,7 @@ def scale_problem(
         position=problem.offset / length,
         velocity=problem.state.velocity / (acceleration * time),
         target_velocity=problem.target_velocity / (acceleration * time),
-        gravity=problem.gravity / acceleration,
+        gravity=problem.pull_at_target / acceleration,
         mass_bounds=bounds,
         propellant=min(problem.log_mass_ratio / kappa, loose) if limit_propellant else loose,
         pointing_cosine=-1.0 if limit is None else float(np.cos(limit)),
@@ -241,5 +245,6 @@ def scale_problem(
         final_thrust=_axis_and_cosine(problem.limits.final_thrust_direction),
         thrust_rate=rate_bounds(problem, time, nodes, log_mass),
         sight=_cone_rows(problem.limits.line_of_sight),
+        rotation=problem.angular_velocity * time,
         error_limit=_LOOSE if error_limit is None else error_limit / length,
     )

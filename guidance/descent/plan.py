@@ -14,6 +14,7 @@ from guidance.arrays import Array
 from guidance.descent.certificate import Certificate
 from guidance.descent.problem import LandingProblem
 from guidance.descent.residuals import Residuals, fly_residuals
+from guidance.descent.rotating_frame import rotating_states_at
 from guidance.descent.trajectory import Trajectory, no_trajectory
 
 
@@ -163,7 +164,10 @@ class Plan:
             ValueError: the plan holds no flight.
         """
         self._demand_flight("has no states")
-        return self.trajectory.states_at(np.asarray(time, dtype=np.float64), self.problem.gravity)
+        times = np.asarray(time, dtype=np.float64)
+        if self.problem.rotates:
+            return rotating_states_at(self.trajectory, times, self.problem)
+        return self.trajectory.states_at(times, self.problem.gravity)
 
     @cached_property
     def residuals(self) -> Residuals:

@@ -19,6 +19,9 @@ ROUNDING = 1e-6
 """What rounding may take from a limit: of the distance to the target or 1 m, of the speed or 1 m/s."""
 
 
+_VECTORS = ("target", "gravity", "target_velocity", "angular_velocity")
+
+
 def lies_below(start: Array, target: Array) -> bool:
     """Whether a start [m] lies below a target's altitude by more than rounding; both of shape (3,)."""
     depth = float(target[2] - start[2])
@@ -36,9 +39,12 @@ class LandingProblem:
         state: where the flight starts; its mass includes the propellant.
         target: [m] shape (3,), site frame.
         lander: the vehicle; its pointing limit is measured from the z axis.
-        gravity: [m/s^2] shape (3,), constant.
+        gravity: [m/s^2] shape (3,), constant in the site frame.
         limits: what the path has to keep.
         target_velocity: [m/s] shape (3,), at the target; rest unless given.
+        angular_velocity: [rad/s] shape (3,), of the site frame, about an axis through its origin: Coriolis
+            and centrifugal acceleration act beside gravity, which is the pull at the origin. Zero unless
+            given.
 
     Raises:
         ValueError: an argument is out of range or not finite, the start lies below the target's altitude by
@@ -51,10 +57,11 @@ class LandingProblem:
     gravity: Array
     limits: Limits = NO_LIMITS
     target_velocity: Array = field(default_factory=lambda: np.zeros(3))
+    angular_velocity: Array = field(default_factory=lambda: np.zeros(3))
 
     def __post_init__(self) -> None:
         """Refuse what no solver should see."""
-        for name in ("target", "gravity", "target_velocity"):
+        for name in _VECTORS:
             vector = finite_vector(name, getattr(self, name), 3)
             vector.flags.writeable = False
             object.__setattr__(self, name, vector)
@@ -62,7 +69,7 @@ class LandingProblem:
             raise ValueError(f"lander must be a Lander, got {self.lander!r}")
         if not isinstance(self.limits, Limits):
             raise ValueError(f"limits must be a Limits, got {self.limits!r}")
-        numbers = {name: getattr(self, name) for name in ("target", "gravity", "target_velocity")}
+        numbers = {name: getattr(self, name) for name in _VECTORS}
         for name, vector in ({"state": self.state.as_array()} | numbers).items():
             if np.abs(vector).max() > LARGEST_NUMBER:
                 raise ValueError(f"{name}: no number may exceed {LARGEST_NUMBER:g}, got {vector.tolist()}")
@@ -118,6 +125,17 @@ class LandingProblem:
             return 0.0
         angle, across = self.glide_slope_limit, math.hypot(vector[0], vector[1])
         return math.cos(angle) * across - math.sin(angle) * float(vector[2])
+
+    @property
+    def rotates(self) -> bool:
+        """Whether the site frame turns."""
+        return bool(self.angular_velocity.any())
+
+    @property
+    def pull_at_target(self) -> Array:
+        """[m/s^2] shape (3,): gravity and the centrifugal acceleration at the target."""
+        spin = self.angular_velocity
+        return self.gravity - np.cross(spin, np.cross(spin, self.target))
 
     @property
     def arrived(self) -> bool:

@@ -69,11 +69,14 @@ def find_primer_flight(problem: LandingProblem, time: float | None = None) -> Pr
 
     Returns:
         The flight; None where none was found, where the engine cannot stop or cannot lift the vehicle, where
-        the flight does not end at rest, where the thrust may not jump, where gravity vanishes, where no coast
-        is left between the burns, or where the flight breaks a limit of the problem: the method knows none.
+        the flight does not end at rest, where the frame turns, where the thrust may not jump, where gravity
+        vanishes, where no coast is left between the burns, or where the flight breaks a limit of the
+        problem: the method knows none.
     """
     lander, mass = problem.lander, problem.state.mass
-    if lander.min_thrust > 0.0 or problem.target_velocity.any() or problem.limits.thrust_rate is not None:
+    if lander.min_thrust > 0.0 or problem.target_velocity.any() or problem.rotates:
+        return None
+    if problem.limits.thrust_rate is not None:
         return None
     unit = lander.max_thrust / mass
     scaled = PrimerProblem(

@@ -126,6 +126,8 @@ def _too_fast(problem: LandingProblem) -> str:
 
 def _speed_at_contact_squared(problem: LandingProblem) -> float:
     """[m^2/s^2] least squared speed of sink at the target's altitude; not above zero where it can stop."""
+    if problem.rotates:  # what pulls at it is not gravity alone
+        return 0.0
     sink, height = -float(problem.state.velocity[2]), float(problem.offset[2])
     return sink * sink - 2.0 * _lift(problem) * height if sink > problem.speed_rounding else 0.0
 
@@ -160,7 +162,8 @@ def time_window(problem: LandingProblem, free_landing_point: bool = False) -> Ti
     """Closed-form bounds on the time of flight.
 
     Where nothing bounds it from above (no gravity, no least thrust) the window ends at a hundred times the
-    time that the engine needs to stop and to cross the distance.
+    time that the engine needs to stop and to cross the distance. In a frame that turns these are no bounds
+    on the time but where to look for it; what the two ends forbid by themselves is forbidden there too.
 
     Args:
         problem: the landing problem.
@@ -186,6 +189,9 @@ def time_window(problem: LandingProblem, free_landing_point: bool = False) -> Ti
     limits = _necessary(problem, free_landing_point)
     low, contact = 1e-3 * engine_time, _latest_contact(problem)
     window = _hull(limits["maximum thrust"] + limits["propellant"], low, min(high, contact))
+    if problem.rotates:
+        around = TimeWindow(0.5 * window.low, 2.0 * window.high)
+        return TimeWindow(low, high) if window.empty else around
     if not window.empty:
         return window
     if contact < high and not _hull(limits["maximum thrust"] + limits["propellant"], low, high).empty:

@@ -29,6 +29,7 @@ class PdgCommand:
         min_thrust: Least thrust [N].
         specific_impulse: [s], referred to 9.80665 m/s^2.
         gravity: Gravity x y z [m/s^2].
+        angular_velocity: Angular velocity x y z of the site [rad/s].
         pointing_limit_deg: Greatest angle of thrust from the vertical [deg].
         glide_slope_limit_deg: Greatest angle of the vehicle from the vertical, seen from the landing point
             [deg].
@@ -54,6 +55,7 @@ class PdgCommand:
     min_thrust: float = 0.0
     specific_impulse: float = 325.0
     gravity: tuple[float, float, float] = (0.0, 0.0, -1.62)
+    angular_velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
     pointing_limit_deg: float | None = None
     glide_slope_limit_deg: float | None = None
     speed_limit: float | None = None
@@ -95,6 +97,7 @@ class PdgCommand:
             self.target,
             lander=lander,
             gravity=self.gravity,
+            angular_velocity=self.angular_velocity,
             limits=self.limits,
             time_of_flight=self.time_of_flight,
             nodes=self.nodes,

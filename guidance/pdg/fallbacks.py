@@ -66,7 +66,7 @@ class Request:
     @property
     def bounds_first(self) -> bool:
         """Whether the dual bound is asked before any search."""
-        return self.time_of_flight is None and self.method in ("auto", "convex")
+        return self.time_of_flight is None and self.method in ("auto", "convex") and not self.problem.rotates
 
     def finer(self, nodes: int, found: Plan) -> Request:
         """The same on more nodes, from the plan found so far."""
@@ -105,7 +105,7 @@ def answer(request: Request, unreachable: str) -> Plan:
 
 def _bounded(plan: Plan, request: Request) -> Plan:
     """The plan with a way to prove what no flight undercuts; of its duration, where that was asked for."""
-    if plan.status is not PlanStatus.OPTIMAL or plan.propellant <= 0.0:
+    if plan.status is not PlanStatus.OPTIMAL or plan.propellant <= 0.0 or plan.problem.rotates:
         return plan
     this_time_alone = request.time_of_flight is not None
     return replace(plan, proof=partial(_prove_bound, plan.problem, plan.trajectory, this_time_alone))
@@ -277,7 +277,8 @@ def _prove_infeasible(request: Request, anywhere: bool) -> Certificate | ConvexS
     from guidance.planning.convex_planner import prove_infeasible
     from guidance.planning.infeasibility import prove_by_dual_bound
 
-    if request.time_of_flight is None and not request.bounds_first and not anywhere:
+    bounded = request.bounds_first or request.problem.rotates
+    if request.time_of_flight is None and not bounded and not anywhere:
         proof = prove_by_dual_bound(request.problem)
         if proof is not None:
             return proof

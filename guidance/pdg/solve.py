@@ -38,6 +38,7 @@ def solve_pdg(
     *,
     lander: Lander = PAPER_LANDER,
     gravity: ArrayLike = MOON_GRAVITY,
+    angular_velocity: ArrayLike = (0.0, 0.0, 0.0),
     target_velocity: ArrayLike = (0.0, 0.0, 0.0),
     limits: Limits = NO_LIMITS,
     glide_slope_limit: float | None = None,
@@ -56,6 +57,7 @@ def solve_pdg(
         target: [m] shape (3,), site frame; the trajectory never goes below its altitude.
         lander: the vehicle. Its pointing limit is measured from the z axis.
         gravity: [m/s^2] shape (3,).
+        angular_velocity: [rad/s] shape (3,), of the site frame about an axis through its origin.
         target_velocity: [m/s] shape (3,), at the target; one that points up, from below, is infeasible.
         limits: what the path has to keep.
         glide_slope_limit: [rad] shorthand for `limits.glide_slope`.
@@ -88,6 +90,7 @@ def solve_pdg(
         finite_vector("gravity", gravity, 3),
         _with_shorthands(limits, glide_slope=glide_slope_limit, speed=speed_limit),
         finite_vector("target_velocity", target_velocity, 3),
+        finite_vector("angular_velocity", angular_velocity, 3),
     )
     _check_choices(nodes, method, unreachable, guess)
     plan = answer(Request(problem, nodes, _seconds(time_of_flight), method, guess), unreachable)

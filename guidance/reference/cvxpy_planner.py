@@ -23,6 +23,7 @@ import numpy as np
 from guidance.arrays import Array
 from guidance.descent.plan import Plan, PlanStatus
 from guidance.descent.problem import LandingProblem
+from guidance.descent.rotating_frame import transition
 from guidance.descent.trajectory import Trajectory, no_trajectory
 from guidance.flight_time.time_window import forbidden_by, time_window
 from guidance.golden_section import divide, keep_lower, keep_upper
@@ -45,6 +46,7 @@ class _Structure(NamedTuple):
     final_thrust: bool = False
     sight: bool = False
     rate: bool = False
+    rotates: bool = False
 
 
 class _Model(NamedTuple):
@@ -82,6 +84,10 @@ def _model(nodes: int, structure: _Structure) -> _Model:
         "sight_along": cp.Parameter(3),
         "sight_across": cp.Parameter((3, 2)),
         "thrust_step": cp.Parameter(nonneg=True),
+        "step": cp.Parameter((6, 6)),  # of the state, transposed; then of the thrust
+        "first": cp.Parameter((3, 6)),
+        "last": cp.Parameter((3, 6)),
+        "fall": cp.Parameter((1, 6)),
     }
     ones = np.ones((nodes - 1, 1))
     g_dt, g_dt2 = (cp.reshape(p[name], (1, 3), order="C") for name in ("g_dt", "g_dt2"))
@@ -91,13 +97,20 @@ def _model(nodes: int, structure: _Structure) -> _Model:
         z[0] == 0,
         r[-1] == 0,
         v[-1] == p["vf"],
-        r[1:] == r[:-1] + p["dt"] * v[:-1] + p["dt2"] * (u[:-1] / 3 + u[1:] / 6) + ones @ g_dt2 / 2,
-        v[1:] == v[:-1] + p["dt"] * (u[:-1] + u[1:]) / 2 + ones @ g_dt,
         z[1:] == z[:-1] - p["burn"] * (s[:-1] + s[1:]),
         cp.norm(u, axis=1) <= s,
         cp.multiply(p["mass"], s) <= p["offset"] - z,
         r[1:-1, 2] >= 0,
     ]
+    if structure.rotates:
+        before, after = cp.hstack([r[:-1], v[:-1]]), cp.hstack([r[1:], v[1:]])
+        pushed = u[:-1] @ p["first"] + u[1:] @ p["last"]
+        rules.append(after == before @ p["step"] + pushed + ones @ p["fall"])
+    else:
+        rules += [
+            r[1:] == r[:-1] + p["dt"] * v[:-1] + p["dt2"] * (u[:-1] / 3 + u[1:] / 6) + ones @ g_dt2 / 2,
+            v[1:] == v[:-1] + p["dt"] * (u[:-1] + u[1:]) / 2 + ones @ g_dt,
+        ]
     if structure.min_thrust:
         floor = cp.Variable(nodes)  # keeps each product to one parameter
         rules += [floor == p["offset"] - z, cp.multiply(p["mass"], s) >= p["ratio"] * floor]
@@ -131,6 +144,7 @@ def _structure(problem: LandingProblem) -> _Structure:
         problem.limits.final_thrust_direction is not None,
         problem.limits.line_of_sight is not None,
         problem.limits.thrust_rate is not None,
+        problem.rotates,
     )
 
 
@@ -160,7 +174,7 @@ def _solve_once(problem: LandingProblem, nodes: int, time: float, reference: Arr
     units = Units.of(problem)
     model, p, x = _model(nodes, _structure(problem))
     dt = time / (nodes - 1) / units.time
-    gravity = problem.gravity / units.acceleration
+    gravity = problem.pull_at_target / units.acceleration
     p["r0"].value, p["v0"].value = problem.offset / units.length, problem.state.velocity / units.speed
     p["vf"].value = problem.target_velocity / units.speed
     p["dt"].value, p["dt2"].value = dt, dt**2
@@ -178,6 +192,10 @@ def _solve_once(problem: LandingProblem, nodes: int, time: float, reference: Arr
     if sight is not None:
         p["sight_along"].value = math.sin(sight.angle) * sight.direction
         p["sight_across"].value = math.cos(sight.angle) * sight.across.T
+    if problem.rotates:
+        turned = transition(problem.angular_velocity * units.time, dt)
+        p["step"].value, p["first"].value, p["last"].value = turned.state.T, turned.first.T, turned.last.T
+        p["fall"].value = ((turned.first + turned.last) @ gravity)[None]
     p["thrust_step"].value = (problem.limits.thrust_rate or 0.0) / problem.lander.max_thrust * dt * units.time
     try:
         with warnings.catch_warnings():

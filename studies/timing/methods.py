@@ -71,6 +71,7 @@ def ask(
             problem.target,
             lander=problem.lander,
             gravity=problem.gravity,
+            angular_velocity=problem.angular_velocity,
             limits=problem.limits,
             target_velocity=problem.target_velocity,
             time_of_flight=time_of_flight,

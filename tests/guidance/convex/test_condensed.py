@@ -97,5 +97,5 @@ def test_what_is_infeasible_only_by_the_floor_is_told_so():
 
 def test_limits_on_the_path_are_not_condensed():
     assert ConstraintSet(NODES, min_thrust=True, pointing=True, final_thrust_direction=True).can_condense
-    for name in ("glide_slope", "speed_limit", "line_of_sight", "free_landing_point"):
+    for name in ("glide_slope", "speed_limit", "line_of_sight", "rotates", "free_landing_point"):
         assert not ConstraintSet(NODES, **{name: True}).can_condense
