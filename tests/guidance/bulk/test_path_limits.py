@@ -8,6 +8,7 @@ from descents import GRAVITY, TARGET, harsh_start, paper_start
 
 from guidance import PAPER_LANDER, State
 from guidance.bulk.certified_flight import Finding, answer_start, vehicle_of
+from guidance.descent.limits import Limits
 from guidance.descent.problem import LandingProblem
 from guidance.flight_time.extremal import LEGS, PrimerPath
 from guidance.flight_time.neighbouring_extremals import new_extremal
@@ -73,7 +74,9 @@ def test_limits_refuse_what_the_indirect_method_refuses():
         lander = replace(PAPER_LANDER, pointing_limit=rng.uniform(0.3, 1.8)) if k % 3 == 0 else PAPER_LANDER
         glide = float(rng.uniform(0.3, math.pi / 2)) if k % 3 == 1 else None
         speed = float(rng.uniform(30.0, 90.0)) if k % 3 == 2 else None
-        problem = LandingProblem(State.parse(start), TARGET, lander, GRAVITY, glide, speed)
+        problem = LandingProblem(
+            State.parse(start), TARGET, lander, GRAVITY, Limits(glide_slope=glide, speed=speed)
+        )
         vehicle = vehicle_of(lander, GRAVITY, glide, speed)
         answer, _ = answer_start(np.array(start), TARGET, vehicle, new_extremal())
         seen[Finding(answer.finding)] += 1
