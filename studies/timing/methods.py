@@ -193,6 +193,7 @@ def timed_methods(openscvx: OpenscvxPlanner | None = None) -> list[Method]:
     """
     cvxpy, casadi, both = _by_method(CVXPY), _by_method(CASADI), (True, False)
     methods = [Method(OWN_METHOD, nodes, free, ask) for nodes in (DEFAULT_NODES, 31) for free in both]
+    methods += [Method(CONVEX, DEFAULT_NODES, free, _by_method(CONVEX)) for free in both]
     methods += [Method(DPP_METHOD, DEFAULT_NODES, free, cvxpy) for free in both]
     methods.append(Method(REBUILT_METHOD, DEFAULT_NODES, False, cvxpy, _forget_cvxpy_model))
     methods += [Method(CASADI, DEFAULT_NODES, free, casadi) for free in both]
