@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from guidance.descent.plan import GuidanceError, InfeasibleError, Plan, PlanStatus, SolverFailedError
     from guidance.dynamics import propagate
     from guidance.lander import PAPER_LANDER, Lander
-    from guidance.pdg.solve import solve_pdg
+    from guidance.pdg.prepared import solve_pdg
     from guidance.state import State
     from guidance.zem_zev import saturate_thrust, time_to_go, zem_zev_acceleration
 
@@ -54,7 +54,7 @@ __getattr__, __dir__ = lazy_exports(
         "State": "guidance.state",
         "propagate": "guidance.dynamics",
         "saturate_thrust": "guidance.zem_zev",
-        "solve_pdg": "guidance.pdg.solve",
+        "solve_pdg": "guidance.pdg.prepared",
         "solve_pdg_many": "guidance.bulk.solve",
         "time_to_go": "guidance.zem_zev",
         "zem_zev_acceleration": "guidance.zem_zev",

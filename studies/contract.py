@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 
 from hda.flight.episode import fly, fly_legs, inform_pilot
+from hda.flight.episode_row import summarize_episode
 from hda.policies.entry import AnyPolicy
 from hda.policy import Decision
 from hda.task.observation import Observation
 from hda.task.presets import Preset
 from hda.task.scenario import Scenario, sample_scenario
-from studies.campaign.rows import summarize_episode
 
 _CHECK_SEED = 4_000_000_000  # no study is flown at it
 

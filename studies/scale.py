@@ -22,11 +22,12 @@ from rich.console import Console
 
 from guidance.console import tolerate_encoding
 from guidance.validation import finite_number
+from studies.campaign.claimed_folder import Existing
 from studies.campaign.command_line import open_folder, resumable
 from studies.campaign.provenance import describe_run, write_provenance
 from studies.campaign.run_options import FolderOptions
 from studies.campaign.shards import write_durably
-from studies.campaign.study_folder import Existing, open_study_folder
+from studies.campaign.study_folder import open_study_folder
 from studies.columns import Column, console_table, write_csv, write_markdown
 from studies.compare.command import Comparison, plan_study, with_reference
 
@@ -148,7 +149,7 @@ def measure_scale(options: Scale) -> list[Measurement]:
         ValueError: an option names something unknown, a folder holds another study, or a study failed.
         OSError: the folder cannot be written.
     """
-    out = open_folder(options.out)
+    existing, out = options.existing, open_folder(options.out)
     measured = []
     console = Console(width=max(Console().width, 110))
     with console.status("measuring") as status:
@@ -160,10 +161,10 @@ def measure_scale(options: Scale) -> list[Measurement]:
                     policies=(options.policy,),
                     workers=workers,
                     out=out / f"{episodes}-episodes-{workers}-workers",
-                    overwrite=options.resume,  # one that was stopped is measured anew, whole
+                    overwrite=existing is not Existing.REFUSE,  # one that was stopped is measured anew, whole
                 )
                 plan_study(study)
-                found = read_measurement(study) if options.resume else None
+                found = read_measurement(study) if existing is Existing.RESUME else None
                 measured.append(found or _measure_and_keep(study))
     write_csv(out / "table.csv", COLUMNS, measured)
     write_markdown(out / "table.md", COLUMNS, measured)

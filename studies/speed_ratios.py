@@ -31,7 +31,9 @@ _UPDATE_ROUNDS = 5  # at most: one takes seconds
 _IMPORT = "import time; s = time.process_time(); import {module}; print(time.process_time() - s)"
 
 FREE_TO_FIXED_LIMIT = 2.0
-"""Most that a free-time solve may cost, in fixed-time solves of the same nodes."""
+"""Most that a free-time solve of the convex method may cost, in fixed-time solves of the same nodes."""
+EXACT_TO_MESH_LIMIT = 0.125
+"""Most that `solve_pdg` may cost where the indirect method answers, in solves of the convex method."""
 BULK_LIMIT = 0.5
 """Most that a start of `solve_pdg_many` may cost, in calls of `solve_pdg`."""
 ENCODING_LIMIT = 7.0
@@ -95,7 +97,7 @@ def measure_ratios(preset: str = "paper", repeats: int = 15) -> list[SpeedRatio]
     """
     finite_number("repeats", repeats, at_least=1)
     return [
-        _compare_solves(preset, repeats),
+        *_compare_solves(preset, repeats),
         _compare_bulk(preset, repeats),
         _compare_encoding(preset, repeats),
         _compare_updates(min(repeats, _UPDATE_ROUNDS)),
@@ -103,19 +105,22 @@ def measure_ratios(preset: str = "paper", repeats: int = 15) -> list[SpeedRatio]
     ]
 
 
-def _compare_solves(preset: str, repeats: int) -> SpeedRatio:
-    free, fixed = [], []
+def _compare_solves(preset: str, repeats: int) -> tuple[SpeedRatio, SpeedRatio]:
+    exact, free, fixed = [], [], []
     for episode in range(repeats + 1):
         scenario = sample_scenario(preset, 0, episode, "tuning")
         view = scenario.view
         solve = partial(
             solve_pdg, scenario.initial_state, view.nominal_target, lander=view.lander, gravity=view.gravity
         )
-        plan, seconds = _time(solve)
+        exact.append(_time(solve)[1])
+        convex = partial(solve, method="convex")
+        plan, seconds = _time(convex)
         free.append(seconds)
-        fixed.append(_time(partial(solve, time_of_flight=plan.time_of_flight))[1])
-    return SpeedRatio(
-        "free-time solve", "fixed-time solve", _median(free), _median(fixed), FREE_TO_FIXED_LIMIT
+        fixed.append(_time(partial(convex, time_of_flight=plan.time_of_flight))[1])
+    return (
+        SpeedRatio("solve_pdg", "its convex method", _median(exact), _median(free), EXACT_TO_MESH_LIMIT),
+        SpeedRatio("free-time solve", "fixed-time solve", _median(free), _median(fixed), FREE_TO_FIXED_LIMIT),
     )
 
 

@@ -56,7 +56,10 @@ RUNS: dict[str, tuple[list[str], list[str]]] = {
     "studies.sample_size": ([], []),
     "studies.scale": ([*SMALL, "--out", "scaled"], ["scaled/table.csv"]),
     "studies.stability": (["--gain-points", "2", "--out", "stable"], ["stable/stability.png"]),
-    "studies.timing": (["--starts", "1", "--out", "timed"], ["timed/timing.csv", "timed/timing.png"]),
+    "studies.timing": (
+        ["--starts", "1", "--answers", "20", "--processes", "1", "--out", "timed"],
+        ["timed/timing.csv", "timed/timing.png", "timed/answers/answers.csv"],
+    ),
     "studies.trade_off": (
         [*SMALL, "--presets", "paper", "--weights", "none", "--policies", "no-divert", "--out", "traded"],
         ["traded/table.csv", "traded/trade-off.png"],

@@ -185,6 +185,8 @@ def bound_start(
         0.0,
         max(vehicle.limits.least_cosine, -1.0),
         vehicle.sine,
+        0.0,
+        0.0,  # no limit on the path: its flight keeps them
     )
     times, cover = bound_by_neighbours(x, problem, case, target, exhaust)
     return Bound(most, times, cover)

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline
 
 from guidance.arrays import Array
 from guidance.descent.plan import Plan
-from guidance.flight_time.extremal import Burn, Extremal, PrimerProblem, add_burn, set_primer
+from guidance.flight_time.extremal import Extremal, PrimerProblem, set_primer
+from guidance.flight_time.linear_system import dot
+from guidance.flight_time.primer_trajectory import advance_extremal
 from guidance.kernel import compile_kernel
 
 
@@ -44,26 +46,7 @@ def set_thrust(x: Extremal, time: float, max_thrust: float, out: Array) -> None:
         out[:] = 0.0
         return
     set_primer(x, time, out)
-    out *= max_thrust / max(np.sqrt(out @ out), 1e-12)
-
-
-@compile_kernel
-def _go_on(x: Extremal, problem: PrimerProblem, begin: float, end: float, state: Array) -> None:
-    """Move (r, v, m), shape (7,), in units of `solve_primer`, from one time to another."""
-    first = max(x.times[0], 0.0)
-    marks = (0.0, first, x.times[1], x.times[2])
-    for arc in range(3):
-        start, stop = max(begin, marks[arc]), min(end, marks[arc + 1])
-        step = stop - start
-        if step <= 0.0:
-            continue
-        for axis in range(3):
-            g = problem.gravity[axis]
-            state[axis] += state[3 + axis] * step + 0.5 * step * step * g
-            state[3 + axis] += step * g
-        if arc != 1:
-            add_burn(x, Burn(start, stop, state[6]), problem.mass_flow, stop, state)
-            state[6] -= problem.mass_flow * step
+    out *= max_thrust / max(math.sqrt(dot(out, out)), 1e-12)
 
 
 @compile_kernel
@@ -87,7 +70,7 @@ def sample_extremal(
     before = 0.0
     for k in range(count):
         time = x.times[2] * k / (count - 1) if k < count - 1 else x.times[2]
-        _go_on(x, problem, before, time, state)
+        advance_extremal(x, problem, before, time, state)
         before = time
         nodes.time[row, k], nodes.mass[row, k] = time, mass * state[6]
         for axis in range(3):
@@ -97,14 +80,8 @@ def sample_extremal(
 
 
 def sample_plan(plan: Plan, row: int, nodes: Nodes) -> None:
-    """Write a plan's flight into a row of the nodes.
-
-    Between a plan's nodes the thrust acceleration is linear in time, so that its position is a cubic and the
-    logarithm of its mass, where the thrust keeps its direction, a quadratic.
-    """
+    """Write a plan's flight into a row of the nodes."""
     time = np.linspace(0.0, plan.time_of_flight, nodes.time.shape[1])
-    flow = np.linalg.norm(plan.thrust, axis=1) / plan.mass / plan.problem.lander.exhaust_velocity
-    path = CubicHermiteSpline(plan.time, plan.position, plan.velocity)
-    nodes.time[row], nodes.position[row], nodes.velocity[row] = time, path(time), path(time, 1)
-    nodes.mass[row] = np.exp(CubicHermiteSpline(plan.time, np.log(plan.mass), -flow)(time))
+    nodes.time[row], nodes.mass[row] = time, plan.trajectory.mass_at(time)
+    nodes.position[row], nodes.velocity[row] = plan.states_at(time)
     nodes.thrust[row] = plan.thrust_at(time)

@@ -119,7 +119,7 @@ class BranchedProgramme:
     def solve(self, scaled: Sequence[ScaledProblem], weights: Array) -> list[ConvexSolution] | None:
         """Least weighted propellant; each branch as a solution of its own, or None if there is none."""
         rows = self.branching.rows(scaled)
-        answer = self._assembly.solve(rows, self._cost(weights), refine=True)
+        answer = self._assembly.solve(rows, self._cost(weights))
         if answer.status is not SolveStatus.SOLVED:
             return None
         layout = self.branching.layout

@@ -143,8 +143,15 @@ class ConvexTemplate:
         unsure = answer.status in (SolveStatus.FAILED, SolveStatus.LIMIT_REACHED)
         if unsure and self._condensed is None:
             answer = self._assembly.solve(rows, cost, refine=True)
+        return self.read_answer(scaled, rows, answer, least_error)
+
+    def read_answer(
+        self, scaled: ScaledProblem, rows: list[Rows], answer: ConicAnswer, least_error: bool = False
+    ) -> ConvexSolution:
+        """What a conic solver's answer to `rows(scaled)` and `cost(least_error)` says."""
         if answer.status is not SolveStatus.SOLVED:
             return ConvexSolution(answer, self._whole, scaled, rows, np.nan, np.nan)
+        cost = self.cost(least_error)
         unit, power = (scaled.length, 2) if least_error else (scaled.kappa, 1)
         value = float(cost @ answer.primal)
         sensitivity = self._sensitivity(rows, answer)

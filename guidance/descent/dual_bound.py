@@ -8,14 +8,19 @@ times of flight. For every flight of T seconds that spends at most J (see `DualB
 
 with f and l the greatest and least thrust over the start mass, c the exhaust velocity, kappa =
 (e^(J/c) - 1)/J and h(p) the greatest p.d over the directions that the engine may point along;
-`guidance.lower_bound` derives it. The check shares no code with the search for the primers. It takes chords
-of h(p(tau)), which is convex: they lie above it, so that what the check computes is a bound on any grid.
+`guidance.lower_bound` derives it. A piece may also use a limit on the path: c.r >= 0 theta seconds before the
+landing, for any c within the dual cone of the glide slope (of the altitude: c up). That adds
+c (tau - theta)_+ to p and -c.(r_0 + v_0 (T - theta) + g (T - theta)^2/2) to D for T >= theta.
+
+The check shares no code with the search for the primers. It takes chords
+of h(p(tau)), which is convex on each side of theta: they lie above it, so that what the check computes is a
+bound on any grid that holds theta.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -35,11 +40,20 @@ class DualPiece:
         begin: [s].
         end: [s]; inf for a constant primer that holds from `begin` on.
         primer: (a, b), shape (6,): a without unit, b in 1/s.
+        path_multiplier: [1/s] c, shape (3,); zero without a limit on the path.
+        path_time: [s] theta, at which that limit is used, before the landing.
     """
 
     begin: float
     end: float
     primer: Array
+    path_multiplier: Array = field(default_factory=lambda: np.zeros(3))
+    path_time: float = math.inf
+
+    def primer_at(self, times: Array) -> Array:
+        """P at times [s] before the landing, shape (n, 3)."""
+        late = np.maximum(times - self.path_time, 0.0)[:, None]
+        return self.primer[:3] + times[:, None] * self.primer[3:] + late * self.path_multiplier
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +107,24 @@ class DualBound:
         chained = marks[:-1] == [piece.begin for piece in self.pieces] and marks[-1] == self.longest
         rising = all(first <= second for first, second in zip([0.0, *marks], marks, strict=False))
         most = _MOST_RATIO * self.problem.lander.exhaust_velocity
-        return chained and rising and 0.0 < self.spent_at_most < most and self.bound <= self.spent_at_most
+        kept = all(self._keeps_path(piece) for piece in self.pieces)
+        return (
+            kept
+            and chained
+            and rising
+            and 0.0 < self.spent_at_most < most
+            and self.bound <= self.spent_at_most
+        )
+
+    def _keeps_path(self, piece: DualPiece) -> bool:
+        """Whether c.r >= 0 wherever the altitude and the glide slope are kept."""
+        c, limit = piece.path_multiplier, self.problem.glide_slope_limit
+        if not (np.isfinite(c).all() and piece.path_time >= 0.0):
+            return False
+        across, up = math.hypot(c[0], c[1]), float(c[2])
+        if limit is None or not self.problem.has_glide_slope:
+            return across == 0.0 and up >= 0.0
+        return across * math.sin(limit) <= up * math.cos(limit) * (1.0 + 1e-12)
 
     def _least_bound(self, piece: DualPiece) -> float:
         """[m/s] the least D over a piece's times of flight."""
@@ -107,10 +138,11 @@ class DualBound:
                     np.linspace(0.0, end, _EVEN),
                     end * np.geomspace(1e-5, 1.0, _RISING),
                     np.linspace(piece.begin, end, _INSIDE),
+                    [min(piece.path_time, end)],
                 ]
             )
         )
-        bounds, sag = self._bounds(piece.primer, marks)
+        bounds, sag = self._bounds(piece, marks)
         inside = marks >= piece.begin
         cells = inside[1:] & inside[:-1]
         between = np.minimum(bounds[1:], bounds[:-1])[cells] - sag[cells]
@@ -118,17 +150,22 @@ class DualBound:
 
     def _rises_for_ever(self, piece: DualPiece) -> bool:
         """Whether D of a constant primer no longer than one does not fall with T: it is linear."""
-        constant = not piece.primer[3:].any() and bool(np.linalg.norm(piece.primer[:3]) <= 1.0 + 1e-12)
+        constant = (
+            not piece.primer[3:].any()
+            and not piece.path_multiplier.any()
+            and bool(np.linalg.norm(piece.primer[:3]) <= 1.0 + 1e-12)
+        )
         return constant and float(piece.primer[:3] @ self.problem.gravity) <= 0.0
 
-    def _bounds(self, primer: Array, times: Array) -> tuple[Array, Array]:
+    def _bounds(self, piece: DualPiece, times: Array) -> tuple[Array, Array]:
         """D at rising times from 0, shape (n,), and what it may sag between them, shape (n - 1,).
 
         Between two times D falls below its ends by at most an eighth of the step squared times the greatest
-        second derivative, -b.g - (f or l) s'; on a chord s' = h' + (f kappa or l/c) s, and s is monotone.
+        second derivative, -(b + c).g - (f or l) s'; on a chord s' = h' + (f kappa or l/c) s, where s is
+        monotone.
         """
-        problem = self.problem
-        reach = _support(primer[:3] + times[:, None] * primer[3:], problem.lander.pointing_limit)
+        problem, primer = self.problem, piece.primer
+        reach = _support(piece.primer_at(times), problem.lander.pointing_limit)
         steps = np.diff(times)
         slopes = np.diff(reach) / steps
         thrust = _ThrustBounds.of(problem, self.spent_at_most)
@@ -142,8 +179,14 @@ class DualBound:
         lowest = np.minimum(switching[1:], switching[:-1])
         falling = np.maximum(-slopes, 0.0) + thrust.full_growth * np.maximum(-lowest, 0.0)
         burning = np.maximum(switching[1:], switching[:-1]) > 0.0
-        bend = -float(primer[3:] @ g) + np.where(burning, thrust.full, thrust.least) * falling
+        kinked = times >= piece.path_time
+        bend = -float(primer[3:] @ g) - np.where(kinked[:-1], float(piece.path_multiplier @ g), 0.0)
+        bend = bend + np.where(burning, thrust.full, thrust.least) * falling
         bounds = speed @ primer[:3] - place @ primer[3:] - spent
+        if kinked.any():
+            before = np.maximum(times - piece.path_time, 0.0)[:, None]
+            there = problem.offset + before * v + 0.5 * before**2 * g
+            bounds = bounds - np.where(kinked, there @ piece.path_multiplier, 0.0)
         return bounds, 0.125 * steps**2 * np.maximum(bend, 0.0)
 
 

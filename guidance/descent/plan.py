@@ -45,7 +45,7 @@ class Plan:
         status: how planning ended.
         problem: what was asked.
         method: which solver planned.
-        trajectory: the flight on N nodes (N - 1 intervals); empty where the status has none.
+        trajectory: the flight on N nodes; empty where the status has none.
         landing_error: [m] distance from landing point to target; nan without a flight.
         message: the ending in words.
         proof: the `certificate`, or what makes it when it is first asked for.
@@ -128,8 +128,9 @@ class Plan:
     def optimality_gap(self) -> float:
         """[kg] what the plan burns above the proved lower bound; nan without a flight or a bound.
 
-        The bound leaves out the limits on the path (altitude, glide slope, speed): where they bind, the gap
-        holds their price too. `certificate.scope` says which times of flight it covers.
+        The bound uses the altitude and the glide slope at one time of each flight, and leaves out the speed
+        limit: where these bind for longer, the gap holds a part of their price too. `certificate.scope` says
+        which times of flight it covers.
         """
         if self.status is not PlanStatus.OPTIMAL or self.certificate is None:
             return float("nan")
@@ -149,6 +150,21 @@ class Plan:
         """
         self._demand_flight("has no thrust")
         return self.trajectory.thrust_at(time)
+
+    def states_at(self, time: ArrayLike) -> tuple[Array, Array]:
+        """Planned position and velocity, exact for the planned thrust.
+
+        Args:
+            time: [s] shape (k,), from 0 to the plan's end.
+
+        Returns:
+            Position [m] and velocity [m/s], shape (k, 3) each.
+
+        Raises:
+            ValueError: the plan holds no flight.
+        """
+        self._demand_flight("has no states")
+        return self.trajectory.states_at(np.asarray(time, dtype=np.float64), self.problem.gravity)
 
     @cached_property
     def residuals(self) -> Residuals:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from guidance.descent.problem import LandingProblem
 from guidance.descent.trajectory import Trajectory
 from guidance.kernel import compile_kernel
 
+_ALIGNED = 0.9999  # cosine of the change of direction over an interval whose thrust keeps it
 _BETWEEN = 4  # Runge-Kutta steps per interval, in which the thrust is smooth; each is a sample of the path
 
 
@@ -113,7 +115,7 @@ class Residuals:
             problem: what the plan was asked.
         """
         lander, tolerance = problem.lander, FLIGHT_TOLERANCE
-        unit = max(1.0, float(np.linalg.norm(problem.gravity)) / -MOON_GRAVITY[2])
+        unit = max(1.0, math.hypot(*problem.gravity) / -MOON_GRAVITY[2])
         allowed = {
             "position": tolerance.position * unit,
             "velocity": tolerance.velocity * unit,
@@ -139,44 +141,36 @@ def _length(x: float, y: float, z: float) -> float:
 
 
 @compile_kernel
-def _fly(
-    start: Array,
-    step: float,
-    mass: Array,
-    acceleration: Array,
-    gravity: Array,
-    exhaust_velocity: float,
-    out: Array,
-) -> None:
-    """Write flown states to `out`, shape ((N - 1) * _BETWEEN + 1, 7), by the classical Runge-Kutta method.
+def _distance(first: Array, second: Array) -> float:
+    return _length(first[0] - second[0], first[1] - second[1], first[2] - second[2])
 
-    The thrust is the plan's: planned mass times an acceleration that is linear between nodes.
+
+@compile_kernel
+def _fly(start: Array, steps: Array, thrust: Array, gravity: Array, exhaust_velocity: float) -> Array:
+    """Flown states, shape ((N - 1) * _BETWEEN + 1, 7), by the classical Runge-Kutta method.
+
+    Args:
+        start: state, shape (7,).
+        steps: [s] shape (N - 1,).
+        thrust: [N] shape (N - 1, 2 * _BETWEEN + 1, 3).
+        gravity: [m/s^2] shape (3,).
+        exhaust_velocity: [m/s].
     """
+    out = np.empty((steps.size * _BETWEEN + 1, 7))
     rate, total, here = np.empty(7), np.empty(7), np.empty(7)
-    dt = step / _BETWEEN
     out[0] = start
-    flow = np.empty(mass.size)
-    for k in range(mass.size):
-        flow[k] = _length(acceleration[k, 0], acceleration[k, 1], acceleration[k, 2]) / exhaust_velocity
-    for k in range(mass.size - 1):
-        slope = math.log(mass[k + 1] / mass[k])
-        bend = 0.5 * step * (flow[k + 1] - flow[k])
+    for k in range(steps.size):
+        dt = steps[k] / _BETWEEN
         for part in range(_BETWEEN):
             state = out[k * _BETWEEN + part]
             here[:] = state
             total[:] = 0.0
-            planned = 0.0
             for stage in range(4):
-                fraction = (part + 0.5 * ((stage + 1) // 2)) / _BETWEEN
-                if stage != 2:
-                    planned = mass[k] * math.exp(fraction * (slope + bend * (1.0 - fraction)))
+                force = thrust[k, 2 * part + (stage + 1) // 2]
                 for axis in range(3):
-                    u = acceleration[k, axis] + fraction * (acceleration[k + 1, axis] - acceleration[k, axis])
                     rate[axis] = here[3 + axis]
-                    rate[3 + axis] = u * planned
-                rate[6] = -_length(rate[3], rate[4], rate[5]) / exhaust_velocity
-                for axis in range(3):
-                    rate[3 + axis] = rate[3 + axis] / here[6] + gravity[axis]
+                    rate[3 + axis] = force[axis] / here[6] + gravity[axis]
+                rate[6] = -_length(force[0], force[1], force[2]) / exhaust_velocity
                 ahead = dt if stage == 2 else 0.5 * dt
                 weight = 2.0 if stage in (1, 2) else 1.0
                 for number in range(7):
@@ -184,6 +178,60 @@ def _fly(
                     here[number] = state[number] + ahead * rate[number]
             for number in range(7):
                 out[k * _BETWEEN + part + 1, number] = state[number] + dt / 6.0 * total[number]
+    return out
+
+
+class _Departures(NamedTuple):
+    """What a flown plan departs from, as its kernel measures it; units as in `Residuals`."""
+
+    position: float
+    velocity: float
+    mass: float
+    landing_position: float
+    greatest_thrust: float
+    least_thrust: float
+    least_between: float
+    lowest: float
+    speed: float
+    relaxation_gap: float
+
+
+@compile_kernel
+def _measure(
+    fine: Array, thrust: Array, trajectory: tuple[Array, Array, Array, Array], exhaust_velocity: float
+) -> _Departures:
+    """Compare flown states with the plan.
+
+    Args:
+        fine: what `_fly` gives.
+        thrust: [N] shape (N - 1, 2 * _BETWEEN + 1, 3).
+        trajectory: time, position, velocity and mass at the nodes.
+        exhaust_velocity: [m/s].
+    """
+    time, position, velocity, mass = trajectory
+    far, fast, heavy, last, speed = 0.0, 0.0, 0.0, 0.0, 0.0
+    for k in range(time.size):
+        flown = fine[k * _BETWEEN]
+        last = _distance(flown[:3], position[k])
+        far, fast = max(far, last), max(fast, _distance(flown[3:6], velocity[k]))
+        heavy = max(heavy, abs(flown[6] - mass[k]))
+        speed = max(speed, _length(flown[3], flown[4], flown[5]))
+    lowest = np.inf
+    for k in range(fine.shape[0]):
+        lowest = min(lowest, fine[k, 2])
+    greatest, least, between, gap = 0.0, np.inf, np.inf, 0.0
+    for k in range(time.size - 1):
+        for part in range(thrust.shape[1]):
+            size = _length(thrust[k, part, 0], thrust[k, part, 1], thrust[k, part, 2])
+            greatest, between = max(greatest, size), min(between, size)
+        first, second = thrust[k, 0], thrust[k, -1]
+        before, after = _length(first[0], first[1], first[2]), _length(second[0], second[1], second[2])
+        least = min(least, before, after)
+        along = first[0] * second[0] + first[1] * second[1] + first[2] * second[2]
+        if along > _ALIGNED * before * after:
+            flow = (mass[k] - mass[k + 1]) / (time[k + 1] - time[k]) * exhaust_velocity
+            gap = max(gap, flow - 0.5 * (before + after))
+    return _Departures(far, fast, heavy, last, greatest, least, between, lowest, speed, gap)
 
 
 def fly_trajectory(trajectory: Trajectory, problem: LandingProblem) -> Array:
@@ -191,18 +239,21 @@ def fly_trajectory(trajectory: Trajectory, problem: LandingProblem) -> Array:
 
     Position [m], velocity [m/s], mass [kg]. The integration errs by less than a millimetre.
     """
-    out = np.empty(((trajectory.nodes - 1) * _BETWEEN + 1, 7))
-    start, exhaust = problem.state.as_array(), trajectory.exhaust_velocity
-    step, acceleration = float(trajectory.time[1]), trajectory.acceleration
-    _fly(start, step, trajectory.mass, acceleration, problem.gravity, exhaust, out)
-    return out
+    return _fly_thrust(trajectory, trajectory.sample_thrust(2 * _BETWEEN), problem)
+
+
+def _fly_thrust(trajectory: Trajectory, thrust: Array, problem: LandingProblem) -> Array:
+    time, exhaust = trajectory.time, trajectory.exhaust_velocity
+    return _fly(problem.state.as_array(), time[1:] - time[:-1], thrust, problem.gravity, exhaust)
 
 
 def pointing_excess(thrust: Array, limit: float | None, max_thrust: float) -> float:
     """[rad] by how much thrusts, shape (N, 3) in any unit, lean beyond a limit; next to none has no lean."""
+    if limit is None:
+        return 0.0
     size = np.linalg.norm(thrust, axis=1)
     burning = size > 1e-3 * max(float(size.max()), 1e-3 * max_thrust)  # what a solver leaves of zero is none
-    if limit is None or not burning.any():
+    if not burning.any():
         return 0.0
     angle = np.arctan2(np.linalg.norm(thrust[burning, :2], axis=1), thrust[burning, 2])
     return max(0.0, float(angle.max()) - limit)
@@ -215,17 +266,6 @@ def _glide_excess(offset: Array, limit: float | None) -> float:
     return max(0.0, float(outside.max()))
 
 
-def _relaxation_gap(trajectory: Trajectory) -> float:
-    """Planned flow against planned thrust, over intervals with one direction of thrust."""
-    size = np.linalg.norm(trajectory.thrust, axis=1)
-    aligned = (
-        np.einsum("ij,ij->i", trajectory.thrust[1:], trajectory.thrust[:-1]) > 0.9999 * size[1:] * size[:-1]
-    )
-    flow = -np.diff(trajectory.mass) / np.diff(trajectory.time) * trajectory.exhaust_velocity
-    gap = flow - 0.5 * (size[1:] + size[:-1])
-    return max(0.0, float(gap[aligned].max())) if aligned.any() else 0.0
-
-
 def fly_residuals(trajectory: Trajectory, problem: LandingProblem) -> Residuals:
     """Fly a plan's trajectory and measure it.
 
@@ -233,27 +273,26 @@ def fly_residuals(trajectory: Trajectory, problem: LandingProblem) -> Residuals:
         trajectory: a flight from the problem's start.
         problem: its limits.
     """
-    fine = fly_trajectory(trajectory, problem)
-    lander = problem.lander
-    flown = fine[::_BETWEEN]
-    times = np.linspace(0.0, trajectory.duration, _BETWEEN * (trajectory.nodes - 1) + 1)
-    size = np.linalg.norm(trajectory.thrust_at(times), axis=1)
-    speed = float(np.linalg.norm(flown[:, 3:6], axis=1).max())
-    position_error = np.linalg.norm(flown[:, :3] - trajectory.position, axis=1)
-    velocity_error = np.linalg.norm(flown[:, 3:6] - trajectory.velocity, axis=1)
+    thrust = trajectory.sample_thrust(2 * _BETWEEN)
+    fine = _fly_thrust(trajectory, thrust, problem)
+    lander, end = problem.lander, fine[-1]
+    nodes = trajectory.time, trajectory.position, trajectory.velocity, trajectory.mass
+    found = _measure(fine, thrust, nodes, trajectory.exhaust_velocity)
+    floor = min(float(problem.target[2]), float(fine[0, 2]))
+    limit = math.inf if problem.speed_limit is None else problem.speed_limit
     return Residuals(
-        position=float(position_error.max()),
-        velocity=float(velocity_error.max()),
-        mass=float(np.abs(flown[:, 6] - trajectory.mass).max()),
-        landing_position=float(position_error[-1]),
-        landing_velocity=float(np.linalg.norm(flown[-1, 3:6] - problem.target_velocity)),
-        thrust_above=max(0.0, float(size.max()) - lander.max_thrust),
-        thrust_below=max(0.0, lander.min_thrust - float(size[::_BETWEEN].min())),
-        thrust_dip=max(0.0, lander.min_thrust - float(size.min())),
+        position=found.position,
+        velocity=found.velocity,
+        mass=found.mass,
+        landing_position=found.landing_position,
+        landing_velocity=math.dist(end[3:6], problem.target_velocity),
+        thrust_above=max(0.0, found.greatest_thrust - lander.max_thrust),
+        thrust_below=max(0.0, lander.min_thrust - found.least_thrust),
+        thrust_dip=max(0.0, lander.min_thrust - found.least_between),
         pointing=pointing_excess(trajectory.thrust, lander.pointing_limit, lander.max_thrust),
-        glide_slope=_glide_excess(flown[:, :3] - flown[-1, :3], problem.glide_slope_limit),
-        altitude=max(0.0, float(min(problem.target[2], fine[0, 2]) - fine[:, 2].min())),
-        speed=0.0 if problem.speed_limit is None else max(0.0, speed - problem.speed_limit),
-        propellant=max(0.0, lander.dry_mass - float(flown[-1, 6])),
-        relaxation_gap=_relaxation_gap(trajectory),
+        glide_slope=_glide_excess(fine[::_BETWEEN, :3] - end[:3], problem.glide_slope_limit),
+        altitude=max(0.0, floor - found.lowest),
+        speed=max(0.0, found.speed - limit),
+        propellant=max(0.0, lander.dry_mass - float(end[6])),
+        relaxation_gap=found.relaxation_gap,
     )

@@ -113,7 +113,7 @@ def fly_extremal(x: Extremal, problem: PrimerProblem) -> PrimerPath:
         state[axis], state[3 + axis] = problem.position[axis], problem.velocity[axis]
     for k in range(points):
         set_primer(x, time, p)
-        size = max(math.sqrt(p @ p), 1e-12)
+        size = max(math.sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]), 1e-12)
         for axis in range(3):
             path.position[k, axis], path.velocity[k, axis] = state[axis], state[3 + axis]
             path.direction[k, axis] = p[axis] / size

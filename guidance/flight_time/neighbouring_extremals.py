@@ -24,7 +24,8 @@ import numpy as np
 
 from guidance.arrays import Array
 from guidance.flight_time.extremal import Extremal, PrimerProblem
-from guidance.flight_time.primer_equations import ANGLES, move_extremal, residuals, set_jacobian, solve_linear
+from guidance.flight_time.linear_system import solve_linear
+from guidance.flight_time.primer_equations import ANGLES, move_extremal, residuals, set_jacobian
 from guidance.kernel import compile_kernel
 
 _FIXED = 6  # equations, and unknowns, of a given time of flight

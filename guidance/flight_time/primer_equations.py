@@ -23,6 +23,7 @@ import numpy as np
 
 from guidance.arrays import Array
 from guidance.flight_time.extremal import Burn, Extremal, PrimerProblem, add_burn
+from guidance.flight_time.linear_system import dot, solve_linear
 from guidance.kernel import compile_kernel
 
 _MOST_STEPS = 30
@@ -74,7 +75,8 @@ def move_extremal(x: Extremal, frame: Array, step: Array, out: Extremal) -> None
 
 
 @compile_kernel
-def _copy(x: Extremal, out: Extremal) -> None:
+def copy_extremal(x: Extremal, out: Extremal) -> None:
+    """Write an extremal into another."""
     for axis in range(3):
         out.primer[0, axis], out.primer[1, axis] = x.primer[0, axis], x.primer[1, axis]
         out.times[axis] = x.times[axis]
@@ -85,10 +87,13 @@ def _set_frame(x: Extremal, frame: Array) -> None:
     """Two unit vectors normal to q1, and two to q2."""
     for k in range(2):
         q = x.primer[k]
-        axis = np.argmin(np.abs(q))
+        axis = 0
+        for i in range(1, 3):
+            if abs(q[i]) < abs(q[axis]):
+                axis = i
         first = -q[axis] * q
         first[axis] += 1.0
-        first /= math.sqrt(first @ first)
+        first /= math.sqrt(dot(first, first))
         for i in range(3):
             j, h = (i + 1) % 3, (i + 2) % 3
             frame[2 * k, i] = first[i]
@@ -97,7 +102,18 @@ def _set_frame(x: Extremal, frame: Array) -> None:
 
 @compile_kernel
 def _norm(values: Array) -> float:
-    return float(np.max(np.abs(values)))
+    """Largest magnitude; nan where a value is."""
+    largest = 0.0
+    for value in values:
+        if math.isnan(value):
+            return value
+        largest = max(largest, abs(value))
+    return largest
+
+
+@compile_kernel
+def _length(values: Array) -> float:
+    return math.sqrt(dot(values, values))
 
 
 @compile_kernel
@@ -105,33 +121,6 @@ def _admitted(x: Extremal, mass_flow: float) -> bool:
     """Whether the times are in order and mass is left."""
     first = max(x.times[0], 0.0)
     return first < x.times[1] < x.times[2] and mass_flow * (first + x.times[2] - x.times[1]) < 0.95
-
-
-@compile_kernel
-def solve_linear(matrix: Array, vector: Array) -> bool:
-    """Solve in place by elimination with row exchange; False where the matrix is singular."""
-    size = vector.size
-    for k in range(size):
-        best = k
-        for i in range(k + 1, size):
-            if abs(matrix[i, k]) > abs(matrix[best, k]):
-                best = i
-        if not abs(matrix[best, k]) > 1e-14:
-            return False
-        if best != k:
-            for j in range(k, size):
-                matrix[k, j], matrix[best, j] = matrix[best, j], matrix[k, j]
-            vector[k], vector[best] = vector[best], vector[k]
-        for i in range(k + 1, size):
-            factor = matrix[i, k] / matrix[k, k]
-            for j in range(k + 1, size):
-                matrix[i, j] -= factor * matrix[k, j]
-            vector[i] -= factor * vector[k]
-    for k in range(size - 1, -1, -1):
-        for j in range(k + 1, size):
-            vector[k] -= matrix[k, j] * vector[j]
-        vector[k] /= matrix[k, k]
-    return True
 
 
 @compile_kernel
@@ -163,48 +152,50 @@ def set_jacobian(
 
 @compile_kernel
 def _newton_step(
-    x: Extremal, problem: PrimerProblem, here: Array, frame: Array, trial: Extremal
+    x: Extremal, problem: PrimerProblem, here: Array, size: int, frame: Array, trial: Extremal
 ) -> tuple[Array, bool]:
-    """Full step towards a root, from a difference Jacobian, and whether there is one."""
+    """Full step towards a root in the first `size` unknowns, from a difference Jacobian; if there is one."""
     jacobian = np.empty((7, 7))
     set_jacobian(x, problem, here, frame, trial, jacobian)
-    full = -here
-    found = solve_linear(jacobian, full)
-    return full, found and bool(np.isfinite(full).all())
+    full = -here[:size]
+    found = solve_linear(jacobian[:size, :size], full)
+    for value in full:
+        found = found and math.isfinite(value)
+    return full, found
 
 
 @compile_kernel
-def _newton(x: Extremal, problem: PrimerProblem) -> bool:
-    """Damped Newton, in place; whether it converged."""
-    frame, step, trial = np.empty((4, 3)), np.empty(7), Extremal(np.empty((2, 3)), np.empty(3))
+def _newton(x: Extremal, problem: PrimerProblem, size: int) -> bool:
+    """Damped Newton, in place, on the first `size` unknowns and equations; whether it converged."""
+    frame, step, trial = np.empty((4, 3)), np.zeros(7), Extremal(np.empty((2, 3)), np.empty(3))
     here, there = np.empty(7), np.empty(7)
     if not _admitted(x, problem.mass_flow):
         return False
     residuals(x, problem, here)
     for _ in range(_MOST_STEPS):
-        if _norm(here) < _CONVERGED:
+        if _norm(here[:size]) < _CONVERGED:
             return True
-        full, found = _newton_step(x, problem, here, frame, trial)
+        full, found = _newton_step(x, problem, here, size, frame, trial)
         if not found:
             return False
         turn, delay = _norm(full[:ANGLES]), _norm(full[ANGLES + 1 :])
         damping = min(1.0, 0.7 / max(1e-9, turn), 0.5 / max(1e-9, delay))
-        before, better = math.sqrt(here @ here), False
+        before, better = _length(here[:size]), False
         for _ in range(12):
-            for number in range(7):
+            for number in range(size):
                 step[number] = damping * full[number]
             move_extremal(x, frame, step, trial)
             if _admitted(trial, problem.mass_flow):
                 residuals(trial, problem, there)
-                if math.sqrt(there @ there) < (1.0 - 0.1 * damping) * before:
+                if _length(there[:size]) < (1.0 - 0.1 * damping) * before:
                     better = True
                     break
             damping *= 0.5
         if not better:
             return False
-        _copy(trial, x)
+        copy_extremal(trial, x)
         here, there = there, here
-    return _norm(here) < _CONVERGED
+    return _norm(here[:size]) < _CONVERGED
 
 
 @compile_kernel
@@ -217,38 +208,57 @@ def _guess(problem: PrimerProblem, first_burn: bool, x: Extremal) -> bool:
         Whether there is one: next to the target's plane a primer may be too long for floating point.
     """
     r, v, gravity, _ = problem
-    up = -gravity / math.sqrt(gravity @ gravity)
-    g = math.sqrt(gravity @ gravity)
-    height, climb = r @ up, v @ up
+    g = math.sqrt(dot(gravity, gravity))
+    up = -gravity / g
+    height, climb = dot(r, up), dot(v, up)
     coast = (2.0 * (1.0 - g) * height - climb * climb) / 2.0
     ignition_speed = math.sqrt(max(climb * climb + 2.0 * g * coast, 1e-6 * g * abs(height)))
     t2 = max((ignition_speed + climb) / g, 1e-2 * ignition_speed / g)
     final = t2 + ignition_speed / (1.0 - g)
     across = (r - height * up) / (0.5 * (t2 + final))
     kick = -across - (v - climb * up)
-    size = math.sqrt(kick @ kick)
+    size = math.sqrt(dot(kick, kick))
     q2 = across + (ignition_speed + g * (final - t2)) * up
-    q2 /= math.sqrt(q2 @ q2)
+    q2 /= math.sqrt(dot(q2, q2))
     t1 = min(t2 - 2.0 * ignition_speed / g, -1e-3 * t2)
     if first_burn and size > 1e-9 * ignition_speed:
         t1 = size if size < 0.8 * t2 else _LATEST_FIRST_BURN * t2
         speed = v + kick
         sine, cosine = 1.0, 0.0
         for _ in range(5):  # the Hamiltonian at t1
-            gap = (speed @ up) - g * (t2 - t1)
+            gap = dot(speed, up) - g * (t2 - t1)
             if gap == 0.0:
                 break
-            cosine = ((q2 @ speed) - sine * (kick @ speed) / size) / gap
+            cosine = (dot(q2, speed) - sine * dot(kick, speed) / size) / gap
             cosine = min(max(cosine, -0.95), 0.95)
             sine = math.sqrt(1.0 - cosine * cosine)
         q1 = sine * kick / size + cosine * up
     else:
         q1 = 0.1 * kick / ignition_speed - up
-        q1 /= math.sqrt(q1 @ q1)
+        q1 /= math.sqrt(dot(q1, q1))
     for axis in range(3):
         x.primer[0, axis], x.primer[1, axis] = q1[axis], q2[axis]
     x.times[0], x.times[1], x.times[2] = t1, t2, final
-    return bool(abs(q1 @ q1 - 1.0) < _UNIT and abs(q2 @ q2 - 1.0) < _UNIT)
+    return abs(dot(q1, q1) - 1.0) < _UNIT and abs(dot(q2, q2) - 1.0) < _UNIT
+
+
+@compile_kernel
+def solve_from(x: Extremal, problem: PrimerProblem, size: int) -> bool:
+    """Newton from a guess, with the time of flight of the guess as unit of time.
+
+    Args:
+        x: a guess in seconds; the answer.
+        problem: in seconds.
+        size: 7; or 6 to hold the time of flight, where the Hamiltonian need not vanish.
+    """
+    r, v, g, flow = problem
+    unit = x.times[2]
+    for k in range(3):
+        x.times[k] /= unit
+    found = _newton(x, PrimerProblem(r / (unit * unit), v / unit, g, flow * unit), size)
+    for k in range(3):
+        x.times[k] *= unit
+    return found
 
 
 @compile_kernel
@@ -262,17 +272,12 @@ def solve_primer(problem: PrimerProblem, x: Extremal) -> bool:
     Returns:
         Whether there was a first guess, and Newton's method converged from it.
     """
-    r, v, g, flow = problem
-    if not LEAST_PULL < g @ g < MOST_PULL or not r @ g < 0.0:
+    r, g = problem.position, problem.gravity
+    if not LEAST_PULL < dot(g, g) < MOST_PULL or not dot(r, g) < 0.0:
         return False
     for attempt in range(2):
         if not _guess(problem, attempt == 0, x):
             continue
-        unit = x.times[2]
-        for k in range(3):
-            x.times[k] /= unit
-        if _newton(x, PrimerProblem(r / (unit * unit), v / unit, g, flow * unit)):
-            for k in range(3):
-                x.times[k] *= unit
+        if solve_from(x, problem, 7):
             return True
     return False

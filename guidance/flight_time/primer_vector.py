@@ -13,6 +13,7 @@ import numpy as np
 from guidance.arrays import Array
 from guidance.descent.problem import LandingProblem
 from guidance.flight_time.extremal import LEGS, Extremal, PrimerPath, PrimerProblem, fly_extremal
+from guidance.flight_time.fixed_time import solve_primer_at
 from guidance.flight_time.primer_equations import solve_primer
 
 
@@ -47,6 +48,11 @@ class PrimerFlight:
         """ln(start mass / final mass)."""
         return -math.log1p(-self.burn_rate * (self.first_burn + self.time - self.braking))
 
+    @property
+    def extremal(self) -> Extremal:
+        """The flight as the kernels read it, in seconds."""
+        return Extremal(self.primer, np.array([self.primer_times[0], self.braking, self.time]))
+
     def direction_at(self, time: float) -> Array:
         """Unit vector of the primer, along which the thrust points; shape (3,)."""
         begin, end = self.primer_times
@@ -54,8 +60,12 @@ class PrimerFlight:
         return p / np.linalg.norm(p)
 
 
-def find_primer_flight(problem: LandingProblem) -> PrimerFlight | None:
+def find_primer_flight(problem: LandingProblem, time: float | None = None) -> PrimerFlight | None:
     """Flight of least propellant by the indirect method, in about 0.1 ms.
+
+    Args:
+        problem: the landing problem.
+        time: [s] of flight; None for the best one.
 
     Returns:
         The flight; None where none was found, where the engine cannot stop or cannot lift the vehicle, where
@@ -73,7 +83,7 @@ def find_primer_flight(problem: LandingProblem) -> PrimerFlight | None:
         lander.max_mass_flow / mass,
     )
     x = Extremal(np.empty((2, 3)), np.empty(3))
-    if not solve_primer(scaled, x):
+    if not solve_primer(scaled, x) or (time is not None and not solve_primer_at(time, scaled, x)):
         return None
     t1, t2, final = (float(time) for time in x.times)
     flight = PrimerFlight(max(t1, 0.0), t2, final, scaled.mass_flow, x.primer, (t1, t2))

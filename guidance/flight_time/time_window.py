@@ -9,6 +9,7 @@ import numpy as np
 
 from guidance.arrays import Array
 from guidance.descent.problem import ROUNDING, LandingProblem
+from guidance.flight_time.ground_contact import find_ground_contact
 
 
 @dataclass(frozen=True)
@@ -121,6 +122,9 @@ def _too_fast(problem: LandingProblem) -> str:
 
 def _speed_at_contact_squared(problem: LandingProblem) -> float:
     """[m^2/s^2] least squared speed of sink at the target's altitude; not above zero where it can stop."""
+    contact = find_ground_contact(problem)
+    if contact is not None:
+        return contact.sink**2
     sink, height = -float(problem.state.velocity[2]), float(problem.offset[2])
     return sink * sink - 2.0 * _lift(problem) * height if sink > problem.speed_rounding else 0.0
 
@@ -130,6 +134,9 @@ def _latest_contact(problem: LandingProblem) -> float:
 
     The flight has to end by then: full thrust straight up keeps it above the ground for the longest.
     """
+    contact = find_ground_contact(problem)
+    if contact is not None:
+        return contact.time
     square = _speed_at_contact_squared(problem)
     if square <= 0.0:
         return math.inf

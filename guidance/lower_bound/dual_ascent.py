@@ -5,7 +5,8 @@ The gradient of D is what the relaxed flight led by the primer misses: with its 
     dD/da = w - v_0 - g T - int |u| d,    dD/db = -(r_0 + v_0 T + g T^2/2) - int tau |u| d,
 
 where |u| follows from the multipliers backward in tau, Y' = -weight - rate Y with Y(T) = 0 and |u| = -Y'. The
-maximum is the least velocity change of the relaxed problem; where D has none, no flight lasts T.
+maximum is the least velocity change of the relaxed problem; where D has none, no flight lasts T. By c, of a
+primer with a limit on the path at theta, the gradient is minus the relaxed flight's place at that time.
 """
 
 from __future__ import annotations
@@ -16,23 +17,45 @@ from typing import NamedTuple
 import numpy as np
 
 from guidance.arrays import Array
-from guidance.flight_time.primer_equations import solve_linear
+from guidance.flight_time.linear_system import dot, solve_linear
 from guidance.kernel import compile_kernel
 from guidance.lower_bound.dual_case import DualCase
-from guidance.lower_bound.dual_function import linear_part, split_step, step_growth, support
+from guidance.lower_bound.dual_function import (
+    AFFINE,
+    THETA,
+    linear_part,
+    split_step,
+    step_growth,
+    support,
+)
 
-_STEPS = 48  # of the grid on which D is maximised: the primer needs no finer one
+STEPS = 48
+"""Of the grid on which D is maximised: the primer needs no finer one."""
 _MOST_ITERATIONS = 60
 _DIFFERENCE = 1e-6  # of the primer, for the second derivative
 _LEAST_DAMPING = 1e-9  # of the curvature that full thrust over the whole flight has
 _TRUSTED_DAMPING = 1e-3  # below it a step's promise is the distance to the maximum
 
 
+class RelaxedThrust(NamedTuple):
+    """The relaxed flight that a primer leads, on the grid of tau.
+
+    Attributes:
+        directions: of the thrust at the nodes, shape (n + 1, 3).
+        weights: [m/s] velocity change about each node, shape (n + 1,).
+        spent: [m/s] int (f mu - l nu).
+    """
+
+    directions: Array
+    weights: Array
+    spent: float
+
+
 class Ascent(NamedTuple):
     """Where an ascent ended.
 
     Attributes:
-        primer: (a, b), shape (6,).
+        primer: (a, b), shape (6,), or (a, b, c, theta), shape (10,).
         value: [m/s] D there.
         stalled: whether no step led higher, as at a kink of D.
     """
@@ -43,15 +66,15 @@ class Ascent(NamedTuple):
 
 
 @compile_kernel
-def dual_value(primer: Array, time: float, case: DualCase, gradient: Array) -> float:
-    """D [m/s] at one time of flight, and its gradient by (a, b), shape (6,)."""
-    step = time / _STEPS
+def relax_thrust(primer: Array, time: float, case: DualCase) -> RelaxedThrust:
+    """The thrust of the relaxed flight of one duration [s] that a primer leads."""
+    step = time / STEPS
     whole = step_growth(step, case)
-    directions, switching = np.empty((_STEPS + 1, 3)), np.empty(_STEPS + 1)
-    slopes, weights = np.empty(_STEPS), np.zeros(_STEPS + 1)
+    directions, switching = np.empty((STEPS + 1, 3)), np.empty(STEPS + 1)
+    slopes, weights = np.empty(STEPS), np.zeros(STEPS + 1)
     here = support(primer, 0.0, case, directions[0])
     switching[0], spent = here - 1.0, 0.0
-    for k in range(_STEPS):
+    for k in range(STEPS):
         there = support(primer, step * (k + 1), case, directions[k + 1])
         slopes[k] = (there - here) / step
         s = switching[k]
@@ -61,7 +84,7 @@ def dual_value(primer: Array, time: float, case: DualCase, gradient: Array) -> f
             s = s * arc.growth.factor + slopes[k] * arc.growth.first
         switching[k + 1], here = s, there
     adjoint = 0.0
-    for k in range(_STEPS - 1, -1, -1):
+    for k in range(STEPS - 1, -1, -1):
         first, second = split_step(switching[k], slopes[k], step, whole, case)
         for arc, begin in ((second, first.duration), (first, 0.0)):
             weight = case.full if arc.burning else case.least
@@ -74,15 +97,40 @@ def dual_value(primer: Array, time: float, case: DualCase, gradient: Array) -> f
             weights[k + 1] += late
             weights[k] += pushed - late
             adjoint += pushed
+    return RelaxedThrust(directions, weights, spent)
+
+
+@compile_kernel
+def dual_value(primer: Array, time: float, case: DualCase, gradient: Array) -> float:
+    """D [m/s] at one time of flight, and its gradient by (a, b) or (a, b, c), shape (6,) or (9,)."""
+    step, thrust = time / STEPS, relax_thrust(primer, time, case)
     for axis in range(3):
         fall = case.gravity[axis] * time
         straight, turned = 0.0, 0.0
-        for k in range(_STEPS + 1):
-            straight += weights[k] * directions[k, axis]
-            turned += weights[k] * directions[k, axis] * step * k
+        for k in range(STEPS + 1):
+            straight += thrust.weights[k] * thrust.directions[k, axis]
+            turned += thrust.weights[k] * thrust.directions[k, axis] * step * k
         gradient[axis] = case.arrival[axis] - case.velocity[axis] - fall - straight
         gradient[3 + axis] = -case.position[axis] - (case.velocity[axis] + 0.5 * fall) * time - turned
-    return linear_part(primer, time, case) - spent
+    if primer.size > AFFINE:
+        gradient[AFFINE:] = 0.0
+        place_before(thrust, time, primer[THETA], case, gradient[AFFINE:])
+        for axis in range(3):
+            gradient[AFFINE + axis] *= -1.0
+    return linear_part(primer, time, case) - thrust.spent
+
+
+@compile_kernel
+def place_before(thrust: RelaxedThrust, time: float, theta: float, case: DualCase, out: Array) -> None:
+    """Write where a relaxed flight of a duration [s] is, theta [s] before its landing, shape (3,) [m]."""
+    step, before = time / STEPS, time - theta
+    for axis in range(3):
+        place = case.position[axis] + (case.velocity[axis] + 0.5 * case.gravity[axis] * before) * before
+        for k in range(STEPS + 1):
+            late = step * k - theta
+            if late > 0.0:
+                place += thrust.weights[k] * thrust.directions[k, axis] * late
+        out[axis] = place if before >= 0.0 else 0.0
 
 
 @compile_kernel
@@ -95,58 +143,90 @@ def two_impulse_primer(time: float, case: DualCase) -> Array:
         after = -case.position[axis] / time - 0.5 * fall
         first[axis] = after - case.velocity[axis]
         last[axis] = case.arrival[axis] - after - fall
-    first /= max(math.sqrt(first @ first), 1e-300)
-    last /= max(math.sqrt(last @ last), 1e-300)
+    first /= max(math.sqrt(dot(first, first)), 1e-300)
+    last /= max(math.sqrt(dot(last, last)), 1e-300)
     primer[:3], primer[3:] = last, (first - last) / time
     return primer
 
 
 @compile_kernel
-def _curvature(primer: Array, time: float, case: DualCase, gradient: Array) -> Array:
-    """-d2D by (a, b T), shape (6, 6), from differences of the gradient."""
-    moved, there = primer.copy(), np.empty(6)
-    out = np.empty((6, 6))
-    for k in range(6):
-        unit = 1.0 if k < 3 else 1.0 / time
-        moved[k] = primer[k] + _DIFFERENCE * unit
+def _numbers_to_primer(numbers: Array, basis: Array, start: Array, out: Array) -> None:
+    """Write the primer that stands for some numbers in a basis, from a start."""
+    for i in range(basis.shape[0]):
+        out[i] = start[i]
+        for k in range(numbers.size):
+            out[i] += basis[i, k] * numbers[k]
+
+
+@compile_kernel
+def _slope(gradient: Array, basis: Array) -> Array:
+    """Gradient by the numbers of a basis."""
+    out = np.zeros(basis.shape[1])
+    for k in range(out.size):
+        for i in range(gradient.size):
+            out[k] += gradient[i] * basis[i, k]
+    return out
+
+
+@compile_kernel
+def _curvature(primer: Array, basis: Array, time: float, case: DualCase, slope: Array) -> Array:
+    """-d2D by the numbers of a basis, from differences of the gradient."""
+    size, moved, there = basis.shape[1], primer.copy(), np.empty(basis.shape[0])
+    out = np.empty((size, size))
+    for k in range(size):
+        for i in range(basis.shape[0]):
+            moved[i] = primer[i] + _DIFFERENCE * basis[i, k]
         dual_value(moved, time, case, there)
-        for i in range(6):
-            out[i, k] = (gradient[i] - there[i]) / _DIFFERENCE / (1.0 if i < 3 else time)
-        moved[k] = primer[k]
+        for i, after in enumerate(_slope(there, basis)):
+            out[i, k] = (slope[i] - after) / _DIFFERENCE
     return 0.5 * (out + out.T)
 
 
 @compile_kernel
-def ascend(start: Array, time: float, case: DualCase, tolerance: float, enough: float) -> Ascent:
+def affine_basis(time: float) -> Array:
+    """The numbers (a, b T) of a primer, shape (6, 6)."""
+    out = np.zeros((6, 6))
+    for k in range(6):
+        out[k, k] = 1.0 if k < 3 else 1.0 / time
+    return out
+
+
+@compile_kernel
+def ascend(
+    start: Array, basis: Array, time: float, case: DualCase, tolerance: float, enough: float
+) -> Ascent:
     """Maximise D for one time of flight.
 
     Args:
-        start: (a, b), shape (6,).
+        start: primer, shape (6,) or (10,).
+        basis: columns are the directions in which it may move, shape (6, 6) or (9, 7); the seventh number,
+            a multiplier, does not fall below zero.
         time: [s] of flight.
         case: the relaxed problem.
         tolerance: [m/s] stop where the next step promises less.
         enough: [m/s] stop where D exceeds this: it may have no maximum.
     """
-    primer, trial = start.copy(), np.empty(6)
-    gradient, there = np.empty(6), np.empty(6)
+    primer, trial, numbers = start.copy(), start.copy(), np.zeros(basis.shape[1])
+    gradient, there = np.empty(basis.shape[0]), np.empty(basis.shape[0])
     value = dual_value(primer, time, case, gradient)
     stalled = False
     damping, size = _LEAST_DAMPING, case.full * time
     for _ in range(_MOST_ITERATIONS):
         if value > enough:
             break
-        curvature = _curvature(primer, time, case, gradient)
+        slope = _slope(gradient, basis)
+        curvature = _curvature(primer, basis, time, case, slope)
         better, promise, reached = False, 0.0, value
+        step = slope.copy()
         for _ in range(20):
-            matrix, step = curvature.copy(), gradient.copy()
-            step[3:] /= time
-            for i in range(6):
+            matrix, step = curvature.copy(), slope.copy()
+            for i in range(step.size):
                 matrix[i, i] += damping * size
-            slope = step.copy()
             if solve_linear(matrix, step):
-                promise = slope @ step
-                trial[:3] = primer[:3] + step[:3]
-                trial[3:] = primer[3:] + step[3:] / time
+                if step.size > AFFINE:
+                    step[AFFINE] = max(step[AFFINE], -numbers[AFFINE])
+                promise = dot(slope, step)
+                _numbers_to_primer(step, basis, primer, trial)
                 reached = dual_value(trial, time, case, there)
                 if reached > value + 0.1 * promise and promise > 0.0:
                     better = True
@@ -155,6 +235,7 @@ def ascend(start: Array, time: float, case: DualCase, tolerance: float, enough: 
         if not better:
             stalled = True
             break
+        numbers += step
         primer[:], gradient[:], value = trial, there, reached
         damping = max(0.01 * damping, _LEAST_DAMPING)
         if promise < tolerance and damping < _TRUSTED_DAMPING:

@@ -7,8 +7,9 @@ than J keeps
     l (1 + B/c) <= |u| <= f (1 + kappa B),    l = T_min/m_0,  f = T_max/m_0,  kappa = (exp(J/c) - 1)/J,
 
 since exp lies above its tangent at 0 and below its chord over [0, J]. These bounds are linear in B, and what
-is proved of every flight that keeps them holds for every real flight that spends at most J. Limits on the
-path (altitude, glide slope, speed) are left out; the pointing limit is kept.
+is proved of every flight that keeps them holds for every real flight that spends at most J. The pointing
+limit is kept, and at one time of each flight the altitude or the glide slope, whichever is the narrower; the
+speed limit is left out.
 """
 
 from __future__ import annotations
@@ -37,6 +38,8 @@ class DualCase(NamedTuple):
         least_growth: [1/s] l/c.
         cosine: of the pointing limit; -1 where there is none.
         sine: of the pointing limit; 0 where there is none.
+        slope_cosine: of the glide slope limit; 0 where the altitude is the only limit.
+        slope_sine: of the glide slope limit, 1 for the altitude; 0 to leave out both.
     """
 
     position: Array
@@ -49,6 +52,8 @@ class DualCase(NamedTuple):
     least_growth: float
     cosine: float
     sine: float
+    slope_cosine: float
+    slope_sine: float
 
 
 @compile_kernel
@@ -63,6 +68,7 @@ def dual_case(problem: LandingProblem, most: float) -> DualCase:
     exhaust = lander.exhaust_velocity
     full, least = lander.max_thrust / mass, lander.min_thrust / mass
     limit = math.pi if lander.pointing_limit is None else lander.pointing_limit
+    slope = problem.glide_slope_limit or 0.0
     return DualCase(
         np.array(problem.offset),
         np.array(problem.state.velocity),
@@ -74,4 +80,6 @@ def dual_case(problem: LandingProblem, most: float) -> DualCase:
         least / exhaust,
         math.cos(limit),
         math.sin(limit) if limit < math.pi else 0.0,
+        math.cos(slope) if problem.has_glide_slope else 0.0,
+        math.sin(slope) if problem.has_glide_slope else 1.0,
     )

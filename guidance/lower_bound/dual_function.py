@@ -15,6 +15,16 @@ Multipliers mu of |u| <= f (1 + kappa B) and nu of |u| >= l (1 + B/c) bound the 
 
 One pass in tau gives the bound D(T) for every T. h(p(tau)) is convex, so its chords lie above it, and D with
 chords is still a bound: each pass here is one, on any grid.
+
+Where every flight keeps n.r >= 0 at theta before its landing (altitude, glide slope), with
+
+    r(T - theta) = r_0 + v_0 (T - theta) + g (T - theta)^2/2 + int_theta^T (tau - theta) u,
+
+a multiplier of that adds to the primer c (tau - theta)_+ with c = n times it, and to D for T >= theta
+
+    -c.(r_0 + v_0 (T - theta) + g (T - theta)^2/2).
+
+Such a primer is (a, b, c, theta), of ten numbers; h(p(tau)) is convex on each side of theta.
 """
 
 from __future__ import annotations
@@ -27,6 +37,11 @@ import numpy as np
 from guidance.arrays import Array
 from guidance.kernel import compile_kernel
 from guidance.lower_bound.dual_case import DualCase
+
+AFFINE = 6
+"""Numbers of a primer (a, b); one with a limit on the path has c and theta besides."""
+THETA = 9
+"""Place of theta in a primer."""
 
 
 class Growth(NamedTuple):
@@ -83,8 +98,11 @@ def grow(rate: float, time: float) -> Growth:
 
 @compile_kernel
 def support(primer: Array, time: float, case: DualCase, direction: Array) -> float:
-    """h(a + b tau), the greatest p.d over the allowed directions; writes the best d, shape (3,)."""
+    """h(p(tau)), the greatest p.d over the allowed directions; writes the best d, shape (3,)."""
     x, y, z = primer[0] + primer[3] * time, primer[1] + primer[4] * time, primer[2] + primer[5] * time
+    if primer.size > AFFINE and time > primer[THETA]:
+        late = time - primer[THETA]
+        x, y, z = x + primer[6] * late, y + primer[7] * late, z + primer[8] * late
     across = math.sqrt(x * x + y * y)
     size = math.sqrt(across * across + z * z)
     if z >= size * case.cosine:
@@ -101,8 +119,13 @@ def support(primer: Array, time: float, case: DualCase, direction: Array) -> flo
 
 @compile_kernel
 def linear_part(primer: Array, time: float, case: DualCase) -> float:
-    """[m/s] a.(w - v_0 - g T) - b.(r_0 + v_0 T + g T^2/2)."""
+    """[m/s] a.(w - v_0 - g T) - b.(r_0 + v_0 T + g T^2/2), and what a limit on the path adds."""
     total = 0.0
+    if primer.size > AFFINE and time >= primer[THETA]:
+        before = time - primer[THETA]
+        for axis in range(3):
+            speed = case.velocity[axis] + 0.5 * case.gravity[axis] * before
+            total -= primer[6 + axis] * (case.position[axis] + speed * before)
     for axis in range(3):
         fall = case.gravity[axis] * time
         total += primer[axis] * (case.arrival[axis] - case.velocity[axis] - fall)
@@ -149,13 +172,17 @@ def sweep_bound(primer: Array, times: Array, case: DualCase, lowest: Array) -> N
     Within a cell D'' <= -b.g + f max(-h', 0) + f f_kappa max(-s, 0): what D may sag below its ends.
 
     Args:
-        primer: (a, b), shape (6,); b in 1/s.
-        times: [s] shape (n + 1,), rising from 0.
+        primer: (a, b), shape (6,), or (a, b, c, theta), shape (10,); b and c in 1/s.
+        times: [s] shape (n + 1,), rising from 0; theta is one of them, or beyond.
         case: the relaxed problem.
         lowest: [m/s] shape (n,), the answer.
     """
     direction = np.empty(3)
-    bend = -(primer[3] * case.gravity[0] + primer[4] * case.gravity[1] + primer[5] * case.gravity[2])
+    bend, kink = 0.0, 0.0
+    for axis in range(3):
+        bend -= primer[3 + axis] * case.gravity[axis]
+        if primer.size > AFFINE:
+            kink -= primer[6 + axis] * case.gravity[axis]
     here = support(primer, times[0], case, direction)
     switching, spent, before = here - 1.0, 0.0, linear_part(primer, times[0], case)
     last = times[1] - times[0]
@@ -174,6 +201,8 @@ def sweep_bound(primer: Array, times: Array, case: DualCase, lowest: Array) -> N
             switching = switching * growth.factor + slope * growth.first
         least = min(least, switching)
         after = linear_part(primer, times[k + 1], case) - spent
+        if primer.size > AFFINE and times[k + 1] > primer[THETA]:
+            bend, kink = bend + kink, 0.0
         sag = bend + case.full * max(-slope, 0.0) + case.full * case.full_growth * max(-least, 0.0)
         lowest[k] = min(before, after) - 0.125 * step * step * max(sag, 0.0)
         before, here = after, there

@@ -11,11 +11,10 @@ from guidance.arrays import Array
 from guidance.descent.certificate import Certificate
 from guidance.descent.dual_bound import DualBound, DualPiece
 from guidance.descent.problem import LandingProblem
-from guidance.flight_time.extremal import Extremal
 from guidance.flight_time.primer_vector import PrimerFlight
 from guidance.lower_bound.dual_ascent import two_impulse_primer
 from guidance.lower_bound.dual_case import dual_case
-from guidance.lower_bound.dual_function import sweep_bound
+from guidance.lower_bound.dual_function import AFFINE, THETA
 from guidance.lower_bound.neighbour_cover import primer_of
 from guidance.lower_bound.time_cover import (
     GRANTED,
@@ -24,10 +23,12 @@ from guidance.lower_bound.time_cover import (
     best_primer,
     claimed_bound,
     cover_times,
+    sweep_cells,
 )
 from guidance.lower_bound.time_grid import time_grid
 
 _CELLS = 240  # of the grid of times, up to the time to begin with
+_HAIR = 1e-9  # of one time of flight: the cell whose bound is that of this time
 _SCOPE = "every time of flight, in continuous time"
 _CAUSES = ("maximum thrust", "propellant")
 GAP_TOLERANCE = 1e-6
@@ -43,7 +44,8 @@ def prove_least_propellant(
 ) -> Certificate:
     """Bound what any flight of a landing burns, in continuous time and over all times of flight.
 
-    The bound is tight (a few grams of the paper's 25 kg) where no limit on the path binds.
+    The bound is tight (a few grams of the paper's 25 kg) where no limit on the path binds, and where the
+    altitude or the glide slope binds at one time.
 
     Args:
         problem: the landing problem.
@@ -73,6 +75,8 @@ def prove_no_flight(problem: LandingProblem, time: float) -> Certificate | None:
     if bound is None:
         return None
     causes = [name for name, without in _relaxed(problem) if _bound_above_tank(without, time) is None]
+    if any(piece.path_multiplier.any() for piece in bound.pieces):
+        causes.append("glide slope" if problem.has_glide_slope else "altitude")
     return Certificate(f"{_SCOPE}: dual bound on the propellant", (*causes, *_CAUSES), (bound,))
 
 
@@ -118,23 +122,27 @@ def _cover(
 ) -> tuple[Array, TimeCover]:
     case = dual_case(problem, most)
     times = time_grid(case, aim.target * (1.0 + 1e-12), time, _CELLS)
-    start = two_impulse_primer(time, case) if flight is None else primer_of(_extremal_of(flight), case)
+    start = two_impulse_primer(time, case) if flight is None else primer_of(flight.extremal, case)
     return times, cover_times(times, case, start, time, aim)
 
 
 def _bound_at(problem: LandingProblem, most: float, time: float) -> DualBound:
     """What flights of one duration spend at least."""
-    case, lowest = dual_case(problem, most), np.empty(_CELLS)
+    case = dual_case(problem, most)
     aim = CoverAim(most, GAP_TOLERANCE * problem.lander.exhaust_velocity, -math.inf)
     found = best_primer(two_impulse_primer(time, case), time, case, aim)
-    times = np.linspace(0.0, time, _CELLS + 1)
-    sweep_bound(found.primer, times, case, lowest)
-    pieces = (DualPiece(time, time, found.primer),)
+    times = np.append(np.linspace(0.0, time, _CELLS + 1)[:-1], [time * (1.0 - _HAIR), time])
+    lowest = np.empty(times.size - 1)
+    sweep_cells(found.primer, times, case, lowest)
+    pieces = (_piece(time, time, found.primer),)
     return DualBound(problem, most, _claim(problem, lowest[-1], most), pieces, time, time)
 
 
-def _extremal_of(flight: PrimerFlight) -> Extremal:
-    return Extremal(flight.primer, np.array([*flight.primer_times, flight.time]))
+def _piece(begin: float, end: float, primer: Array) -> DualPiece:
+    """A primer, shape (6,) or (10,), for a span of times of flight [s]."""
+    if primer.size == AFFINE or not primer[AFFINE:THETA].any():
+        return DualPiece(begin, end, primer[:AFFINE])
+    return DualPiece(begin, end, primer[:AFFINE], primer[AFFINE:THETA], float(primer[THETA]))
 
 
 def _bound_by_cover(problem: LandingProblem, most: float, times: Array, cover: TimeCover) -> DualBound:
@@ -142,10 +150,10 @@ def _bound_by_cover(problem: LandingProblem, most: float, times: Array, cover: T
     starts = np.flatnonzero(np.diff(cover.owner, prepend=-1))
     ends = np.append(times[starts[1:]], times[-1])
     pieces = [
-        DualPiece(float(times[first]), float(end), cover.primers[cover.owner[first]])
+        _piece(float(times[first]), float(end), cover.primers[cover.owner[first]])
         for first, end in zip(starts, ends, strict=True)
     ]
-    pieces.append(DualPiece(float(times[-1]), math.inf, cover.primers[0]))
+    pieces.append(_piece(float(times[-1]), math.inf, cover.primers[0]))
     return DualBound(problem, most, _claim(problem, cover.level, most), tuple(pieces))
 
 

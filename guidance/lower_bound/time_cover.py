@@ -14,9 +14,10 @@ import numpy as np
 
 from guidance.arrays import Array, Index
 from guidance.kernel import compile_kernel
-from guidance.lower_bound.dual_ascent import Ascent, ascend, dual_value, two_impulse_primer
+from guidance.lower_bound.dual_ascent import Ascent, affine_basis, ascend, dual_value, two_impulse_primer
 from guidance.lower_bound.dual_case import DualCase
-from guidance.lower_bound.dual_function import linear_part, sweep_bound
+from guidance.lower_bound.dual_function import AFFINE, THETA, linear_part, sweep_bound
+from guidance.lower_bound.path_limit import PRIMER_SIZE, keep_path, widen_primer
 
 _FIRST_STRIDE = 5e-3  # of the time of flight
 _NUDGE = 0.03  # towards the primer of two impulses: one that is best at another time may lie on a kink of D
@@ -47,7 +48,8 @@ class TimeCover(NamedTuple):
     """What a set of primers proves.
 
     Attributes:
-        primers: (a, b) each, shape (k, 6); b in 1/s. The first is constant, for all times beyond the grid.
+        primers: shape (k, 6) or (k, 10), b and c in 1/s. The first is constant, for all times beyond the
+            grid.
         owner: index of the primer that bounds a cell of the grid of times, shape (n,).
         level: [m/s] the least bound over all cells and beyond.
         best_time: [s] a time of flight whose best bound is the least that was met.
@@ -96,29 +98,34 @@ def last_primer(case: DualCase, time: float) -> Array:
 
 @compile_kernel
 def best_primer(known: Array, time: float, case: DualCase, aim: CoverAim) -> Ascent:
-    """The best primer of a time, from one that is known or from that of two impulses.
+    """The best primer of a time, of ten numbers, from one that is known or from that of two impulses.
 
-    Where no ascent gets that far it is that of two impulses, whose bound is their velocity change.
+    Where no ascent gets that far it is that of two impulses, whose bound is their velocity change. Where its
+    bound is less than the aim's target, a limit on the path may raise it.
     """
-    gradient = np.empty(6)
+    gradient, basis = np.empty(6), affine_basis(time)
     impulses = two_impulse_primer(time, case)
     second = _FIRST_SCALE * impulses
-    first = known + _NUDGE * (second - known)
+    first = known[:AFFINE] + _NUDGE * (second - known[:AFFINE])
     if dual_value(second, time, case, gradient) > dual_value(first, time, case, gradient):
         first, second = second, first
-    found = ascend(first, time, case, 0.1 * aim.tolerance, 2.0 * aim.target)
+    found = ascend(first, basis, time, case, 0.1 * aim.tolerance, 2.0 * aim.target)
     least = dual_value(impulses, time, case, gradient)
     if found.stalled or found.value < least:
-        other = ascend(second, time, case, 0.1 * aim.tolerance, 2.0 * aim.target)
+        other = ascend(second, basis, time, case, 0.1 * aim.tolerance, 2.0 * aim.target)
         if other.value > found.value:
             found = other
-    return found if found.value >= least else Ascent(impulses, least, True)
+    if found.value < least:
+        found = Ascent(impulses, least, True)
+    if found.value > aim.target - aim.tolerance:
+        return Ascent(widen_primer(found.primer), found.value, found.stalled)
+    return keep_path(found, time, case, 0.1 * aim.tolerance, 2.0 * aim.target)
 
 
 @compile_kernel
 def _next_stride(found: Ascent, time: float, stride: float, case: DualCase, tolerance: float) -> float:
     """[s] step downhill to a time with a lower best bound; zero where the bound is as good as level there."""
-    gradient = np.empty(6)
+    gradient = np.empty(THETA)
     half = 1e-4 * time
     rise = dual_value(found.primer, time + half, case, gradient)
     slope = (rise - dual_value(found.primer, time - half, case, gradient)) / (2.0 * half)
@@ -156,10 +163,31 @@ def join_cover(
 ) -> None:
     """Let a primer bound the cells that it bounds best."""
     lowest = np.empty(envelope.size)
-    sweep_bound(primer, times, case, lowest)
+    sweep_cells(primer, times, case, lowest)
     for k in range(envelope.size):
         if lowest[k] > envelope[k]:
             envelope[k], owner[k] = lowest[k], number
+
+
+@compile_kernel
+def sweep_cells(primer: Array, times: Array, case: DualCase, lowest: Array) -> None:
+    """As `sweep_bound`, with the kink of the primer anywhere."""
+    cell = -1
+    if primer.size > AFFINE and primer[THETA] < times[-1]:
+        cell = int(np.searchsorted(times, primer[THETA])) - 1
+    if cell < 0 or primer[THETA] == times[cell + 1]:
+        sweep_bound(primer, times, case, lowest)
+        return
+    marks = np.empty(times.size + 1)
+    marks[: cell + 1], marks[cell + 1], marks[cell + 2 :] = (
+        times[: cell + 1],
+        primer[THETA],
+        times[cell + 1 :],
+    )
+    parts = np.empty(lowest.size + 1)
+    sweep_bound(primer, marks, case, parts)
+    lowest[:cell], lowest[cell + 1 :] = parts[:cell], parts[cell + 2 :]
+    lowest[cell] = min(parts[cell], parts[cell + 1])
 
 
 @compile_kernel
@@ -172,19 +200,20 @@ def cover_times(times: Array, case: DualCase, start: Array, near: float, aim: Co
     Args:
         times: [s] shape (n + 1,), rising from 0.
         case: the relaxed problem.
-        start: (a, b), shape (6,), a primer for the time `near`.
+        start: primer for the time `near`, shape (6,) or (10,).
         near: [s] the time of flight to begin with.
         aim: what level is enough.
     """
     cells = times.size - 1
-    primers, owner = np.empty((MOST_PRIMERS, 6)), np.zeros(cells, np.int64)
+    primers, owner = np.empty((MOST_PRIMERS, PRIMER_SIZE)), np.zeros(cells, np.int64)
     envelope = np.full(cells, -np.inf)
-    primers[0], primers[1] = last_primer(case, times[-1]), along_change(case)
+    primers[0] = widen_primer(last_primer(case, times[-1]))
+    primers[1] = widen_primer(along_change(case))
     for count in range(2):
         join_cover(primers[count], count, times, case, envelope, owner)
     level, best_time, best_value = aim.target, near, np.inf
     time, count, cell, again, stride = near, 2, -1, False, 0.0
-    known = start
+    known = widen_primer(start)
     while count < MOST_PRIMERS:
         found = best_primer(known, time, case, aim)
         better = found.value < best_value - aim.tolerance

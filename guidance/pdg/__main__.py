@@ -34,7 +34,8 @@ class PdgCommand:
         speed_limit: Greatest speed [m/s].
         time_of_flight: [s]; searched for unless given.
         nodes: Nodes of the plan.
-        method: convex is fast; cvxpy and casadi are independent references.
+        method: auto takes indirect where no limit binds, else convex; cvxpy and casadi are independent
+            references.
         unreachable: Fail, or land at the reachable point nearest to the target.
         plot: File to draw the plan into, such as plan.png.
     """
@@ -52,7 +53,7 @@ class PdgCommand:
     speed_limit: float | None = None
     time_of_flight: float | None = None
     nodes: int = DEFAULT_NODES
-    method: PlanningMethod = "convex"
+    method: PlanningMethod = "auto"
     unreachable: Literal["raise", "nearest"] = "raise"
     plot: Path | None = None
 

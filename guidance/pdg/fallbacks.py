@@ -1,6 +1,7 @@
 """Who is asked next where a planner has no answer: the one place where planners meet.
 
-1. The method that was chosen.
+1. The method that was chosen. That is, for 'auto': the indirect method; where it has no flight that keeps the
+   limits the dual bound, which may show that there is none; then the convex problem.
 2. Where relaxing lost min_thrust or the pointing limit, the unrelaxed problem from several guesses.
 3. Where the unrelaxed problem's local method finds nothing, the convex problem for a guess.
 4. Where the flown plan misses its limits, the same on a finer mesh.
@@ -13,7 +14,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,12 +23,17 @@ from guidance.descent.certificate import Certificate
 from guidance.descent.plan import Plan, PlanStatus
 from guidance.descent.problem import LandingProblem
 from guidance.descent.trajectory import Trajectory
+from guidance.flight_time.primer_vector import PrimerFlight, find_primer_flight
 from guidance.state import State
+
+if TYPE_CHECKING:
+    from guidance.convex.programme import ConvexSolution
 
 MOST_NODES = 1000
 """A plan that does not keep its limits on so many nodes is none."""
 
 _CURED_BY_NODES = ("position", "velocity", "altitude", "glide_slope", "speed", "thrust_above", "thrust_dip")
+_OUT_OF_REACH = "the thrust and the propellant on board do not suffice for any flight to the target"
 _LOCAL_GAP = 2e-3  # of propellant, over the relaxed flight's: not worth another guess
 
 
@@ -38,7 +45,7 @@ class Request:
         problem: the landing problem.
         nodes: N.
         time_of_flight: [s] or None to search for the best.
-        method: 'convex', 'casadi' or 'cvxpy'.
+        method: 'auto', 'indirect', 'convex', 'casadi' or 'cvxpy'.
         guess: an earlier plan of nearly the same flight, or None.
         provisional: whether the plan will be replaced before it is flown to its end, as in closed loop: it is
             taken as it is found, on its mesh and near the best time.
@@ -50,6 +57,16 @@ class Request:
     method: str
     guess: Plan | None = None
     provisional: bool = False
+
+    @cached_property
+    def flight(self) -> PrimerFlight | None:
+        """What the indirect method finds."""
+        return find_primer_flight(self.problem, self.time_of_flight)
+
+    @property
+    def bounds_first(self) -> bool:
+        """Whether the dual bound is asked before any search."""
+        return self.time_of_flight is None and self.method in ("auto", "convex")
 
     def finer(self, nodes: int, found: Plan) -> Request:
         """The same on more nodes, from the plan found so far."""
@@ -76,24 +93,25 @@ def answer(request: Request, unreachable: str) -> Plan:
         unreachable: 'raise', or 'nearest' to fly to the reachable point nearest to the target.
     """
     plan = plan_by_method(request)
+    if request.provisional and unreachable == "raise":
+        return plan
     if plan.status is not PlanStatus.OPTIMAL:
         plan = answer_without_flight(plan, request, unreachable)
     if request.provisional:
         return plan
     plan = within_limits(plan, lambda finer, found: _plan_again(request, finer, found))
-    return _bounded(plan, this_time_alone=request.time_of_flight is not None)
+    return _bounded(plan, request)
 
 
-def _bounded(plan: Plan, this_time_alone: bool) -> Plan:
+def _bounded(plan: Plan, request: Request) -> Plan:
     """The plan with a way to prove what no flight undercuts; of its duration, where that was asked for."""
     if plan.status is not PlanStatus.OPTIMAL or plan.propellant <= 0.0:
         return plan
-    trajectory = plan.trajectory
-    return replace(plan, proof=partial(_prove_bound, plan.problem, trajectory, this_time_alone))
+    this_time_alone = request.time_of_flight is not None
+    return replace(plan, proof=partial(_prove_bound, plan.problem, plan.trajectory, this_time_alone))
 
 
 def _prove_bound(problem: LandingProblem, trajectory: Trajectory, this_time_alone: bool) -> Certificate:
-    from guidance.flight_time.primer_vector import find_primer_flight
     from guidance.lower_bound.proof import prove_least_propellant
 
     propellant = float(trajectory.mass[0] - trajectory.mass[-1])
@@ -112,7 +130,20 @@ def _plan_again(request: Request, nodes: int, found: Plan) -> Plan:
 
 def plan_by_method(request: Request) -> Plan:
     """Plan by the chosen method; a plan without a flight still lacks its proof."""
-    if request.method == "convex":
+    if request.method in ("auto", "indirect"):
+        from guidance.planning.indirect_planner import plan_indirect
+
+        plan = plan_indirect(request.problem, request.nodes, request.flight)
+        if plan.status.has_flight or request.method == "indirect":
+            return plan
+    if request.bounds_first and request.flight is None:
+        from guidance.planning.infeasibility import prove_by_dual_bound
+
+        proof = prove_by_dual_bound(request.problem)
+        if proof is not None:
+            none = Plan(PlanStatus.INFEASIBLE, request.problem, "dual bound", message=_OUT_OF_REACH)
+            return replace(none, proof=proof)
+    if request.method in ("auto", "convex"):
         return _plan_convex(request)
     if request.method == "cvxpy":
         from guidance.reference.cvxpy_planner import plan_cvxpy
@@ -131,7 +162,10 @@ def _plan_convex_from(request: Request, seed: float | None) -> Plan:
     """The same, with the time [s] from which the search starts where the indirect method has none."""
     from guidance.planning.convex_planner import plan_convex
 
-    found = plan_convex(request.problem, request.nodes, request.time_of_flight, seed, request.provisional)
+    flight = None if request.time_of_flight is not None else request.flight
+    found = plan_convex(
+        request.problem, request.nodes, request.time_of_flight, seed, request.provisional, flight
+    )
     if found.lossy_flight is None:
         return found.plan
     return _plan_unrelaxed(found.plan, found.lossy_flight, request.time_of_flight)
@@ -211,7 +245,7 @@ def within_limits(plan: Plan, plan_again: Callable[[int, Plan], Plan]) -> Plan:
 
 def answer_without_flight(plan: Plan, request: Request, unreachable: str) -> Plan:
     """Fly to the nearest reachable point, where asked to, or tell infeasible from failed by a certificate."""
-    from guidance.planning.convex_planner import plan_nearest, prove_infeasible
+    from guidance.planning.convex_planner import plan_nearest
 
     problem, nodes, time_of_flight = request.problem, request.nodes, request.time_of_flight
     anywhere = False
@@ -225,10 +259,10 @@ def answer_without_flight(plan: Plan, request: Request, unreachable: str) -> Pla
             plan = replace(nearest, method=plan.method)
     if plan.certificate is not None:
         return plan
-    proof = prove_infeasible(problem, nodes, time_of_flight, anywhere)
+    proof = _prove_infeasible(request, anywhere)
     if isinstance(proof, Certificate):
         return _proved(plan, proof)
-    if plan.method == "convex" and proof is not None and time_of_flight is None and not anywhere:
+    if request.method in ("auto", "convex") and proof is not None and time_of_flight is None and not anywhere:
         retry = _plan_convex_from(request, proof.time)
         if retry.status.has_flight:
             return replace(retry, solves=plan.solves + retry.solves)
@@ -236,6 +270,18 @@ def answer_without_flight(plan: Plan, request: Request, unreachable: str) -> Pla
         message = f"{plan.message}; infeasibility could not be proved"
         return replace(plan, status=PlanStatus.LIMIT_REACHED, message=message)
     return plan
+
+
+def _prove_infeasible(request: Request, anywhere: bool) -> Certificate | ConvexSolution | None:
+    """Certificate that no flight exists, or a solution that refutes it, or None where neither was found."""
+    from guidance.planning.convex_planner import prove_infeasible
+    from guidance.planning.infeasibility import prove_by_dual_bound
+
+    if request.time_of_flight is None and not request.bounds_first and not anywhere:
+        proof = prove_by_dual_bound(request.problem)
+        if proof is not None:
+            return proof
+    return prove_infeasible(request.problem, request.nodes, request.time_of_flight, anywhere)
 
 
 def _proved(plan: Plan, proof: Certificate) -> Plan:

@@ -25,7 +25,7 @@ DEFAULT_NODES = 61
 FEWEST_NODES = 5
 ARRIVED = "the start is the target, with its velocity: no flight is needed"
 """Said of a plan with free time of flight: the shorter it is, the better."""
-PlanningMethod = Literal["convex", "casadi", "cvxpy"]
+PlanningMethod = Literal["auto", "indirect", "convex", "casadi", "cvxpy"]
 """Planners that can be asked for by name."""
 METHODS: tuple[PlanningMethod, ...] = get_args(PlanningMethod)
 UNREACHABLE = ("raise", "nearest")
@@ -42,7 +42,7 @@ def solve_pdg(
     speed_limit: float | None = None,
     time_of_flight: float | None = None,
     nodes: int = DEFAULT_NODES,
-    method: PlanningMethod = "convex",
+    method: PlanningMethod = "auto",
     unreachable: Literal["raise", "nearest"] = "raise",
     guess: Plan | None = None,
     throw: bool = True,
@@ -58,10 +58,13 @@ def solve_pdg(
         glide_slope_limit: [rad] greatest angle from the z axis, seen from the landing point, in (0, pi/2].
         speed_limit: [m/s] greatest speed.
         time_of_flight: [s] None searches for the best.
-        nodes: N, for N - 1 equal intervals; more where the flown plan does not keep its limits on so few.
-        method: 'convex' (lossless convexification in Clarabel; where that loses min_thrust or the pointing
-            limit it asks 'casadi', and `plan.method` says so), 'cvxpy' (the same problem, for reading) or
-            'casadi' (the unrelaxed nonconvex problem by fatrop or IPOPT).
+        nodes: N, for N - 1 intervals, equal ones or those of each arc of 'indirect'; more where the flown
+            plan does not keep its limits on so few, or the arcs need them.
+        method: 'auto' ('indirect' where it has a flight that keeps the limits, else 'convex'; `plan.method`
+            says which), 'indirect' (the primer vector: exact burns and coast), 'convex' (lossless
+            convexification in Clarabel; where that loses min_thrust or the pointing limit it asks 'casadi'),
+            'cvxpy' (the same problem, for reading) or 'casadi' (the unrelaxed nonconvex problem by fatrop or
+            IPOPT).
         unreachable: what to do where the target is out of reach: 'raise', or plan to the softly reachable
             point 'nearest' to it in its plane (always by the convex method).
         guess: an earlier Plan of nearly the same flight, for a search that the indirect method cannot start.
@@ -99,7 +102,8 @@ def replan(
     """A plan for the closed loop, which replaces it before it is flown to its end; a failure is a status.
 
     It is taken as the planner finds it: not flown first, so that it may miss a limit between nodes, and near
-    the best time of flight rather than at it. `solve_pdg` gives plans that are flown as they are.
+    the best time of flight rather than at it; and where there is none, why is not proved for 'raise'.
+    `solve_pdg` gives plans that are flown as they are.
 
     Args:
         problem: what to solve.

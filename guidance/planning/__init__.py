@@ -12,7 +12,7 @@ from guidance.exports import lazy_exports
 if TYPE_CHECKING:
     from guidance.planning.convex_planner import plan_convex, plan_nearest, prove_infeasible
     from guidance.planning.convex_task import ConvexTask
-    from guidance.planning.deferred_decision import DeferredDecision, plan_deferred
+    from guidance.planning.deferred_decision import DeferredDecision, TrunkOptions, plan_deferred
     from guidance.planning.reachability import ReachableSet, reachable_set
 
 _HOMES = {
@@ -24,6 +24,7 @@ _HOMES = {
     "guidance.planning.convex_task": ("ConvexTask",),
     "guidance.planning.deferred_decision": (
         "DeferredDecision",
+        "TrunkOptions",
         "plan_deferred",
     ),
     "guidance.planning.reachability": (
@@ -36,6 +37,7 @@ __all__ = [
     "ConvexTask",
     "DeferredDecision",
     "ReachableSet",
+    "TrunkOptions",
     "plan_convex",
     "plan_deferred",
     "plan_nearest",

@@ -10,9 +10,10 @@ from guidance.descent.certificate import Certificate
 from guidance.descent.plan import Plan, PlanStatus
 from guidance.descent.problem import LandingProblem
 from guidance.descent.trajectory import Trajectory
+from guidance.flight_time.primer_vector import PrimerFlight
 from guidance.flight_time.time_window import forbidden_by
 from guidance.planning.convex_task import ConvexTask, relaxation_tight
-from guidance.planning.infeasibility import prove_by_dual_bound, prove_fixed_time, prove_free_time
+from guidance.planning.infeasibility import prove_fixed_time, prove_free_time
 from guidance.planning.minimum_propellant import (
     LOG_MASS_TOLERANCE,
     minimise_over_time,
@@ -21,7 +22,6 @@ from guidance.planning.minimum_propellant import (
 )
 
 METHOD = "convex"
-_OUT_OF_REACH = "the thrust and the propellant on board do not suffice for any flight to the target"
 _OVERDRAFT = 1e-9  # in ln(mass): rounding of the solver
 _REPLAN_TOLERANCE = 1.5e-5  # in ln(mass), as LOG_MASS_TOLERANCE: 18 g at 1200 kg
 _WORTH_A_SEARCH = 4e-5  # gain in ln(mass) that a time found with relaxed bounds may promise to another time
@@ -49,6 +49,7 @@ def plan_convex(
     time_of_flight: float | None = None,
     guess_time: float | None = None,
     provisional: bool = False,
+    flight: PrimerFlight | None = None,
 ) -> ConvexAnswer:
     """Least propellant to the target.
 
@@ -59,6 +60,7 @@ def plan_convex(
         guess_time: [s] start of that search where the indirect method has none; None to find one on a
             coarse mesh.
         provisional: whether a flight near the best time will do.
+        flight: what the indirect method found, to start that search from; None where it found none.
 
     Returns:
         A plan that is OPTIMAL, or one without a flight: INFEASIBLE without a certificate means "not found,
@@ -72,12 +74,8 @@ def plan_convex(
             return ConvexAnswer(Plan(PlanStatus.INFEASIBLE, problem, METHOD, message=cause))
         solution, solves = task.solve(time_of_flight), 1
     else:
-        proof = prove_by_dual_bound(problem)
-        if proof is not None:
-            none = Plan(PlanStatus.INFEASIBLE, problem, METHOD, message=_OUT_OF_REACH, proof=proof)
-            return ConvexAnswer(none)
         tolerance = LOG_MASS_TOLERANCE if guess_time is None else _REPLAN_TOLERANCE
-        outcome = minimise_over_time(task, tolerance, guess_time, coarse_first=guess_time is None)
+        outcome = minimise_over_time(task, tolerance, guess_time, guess_time is None, flight)
         solution, solves = outcome.solution, outcome.solves
         if solution is None and outcome.cause:
             return ConvexAnswer(Plan(PlanStatus.INFEASIBLE, problem, METHOD, message=outcome.cause))

@@ -10,8 +10,8 @@ from guidance.arrays import Array
 from guidance.convex.clarabel_solver import SolveStatus
 from guidance.convex.condensed import keeps_altitude
 from guidance.convex.constraint_set import ConstraintSet
-from guidance.convex.programme import ConvexSolution, convex_template
-from guidance.convex.scaling import scale_problem
+from guidance.convex.programme import ConvexSolution, ConvexTemplate, convex_template
+from guidance.convex.scaling import ScaledProblem, scale_problem
 from guidance.descent.problem import LandingProblem
 from guidance.descent.residuals import FLIGHT_TOLERANCE, pointing_excess
 
@@ -56,12 +56,16 @@ class ConvexTask:
             self.problem, time, self.nodes, log_mass, self.error_limit, self.limit_propellant
         )
         if self.condense and chosen.can_condense:
-            solution = convex_template(chosen, self.tolerance, condensed=True).solve(scaled)
+            solution = self.ask(convex_template(chosen, self.tolerance, condensed=True), scaled)
             if solution.solved and keeps_altitude(solution.layout, solution.answer.primal):
                 return solution
             if solution.answer.status is SolveStatus.INFEASIBLE:
                 return solution
-        return convex_template(chosen, self.tolerance).solve(scaled, self.least_error)
+        return self.ask(convex_template(chosen, self.tolerance), scaled)
+
+    def ask(self, template: ConvexTemplate, scaled: ScaledProblem) -> ConvexSolution:
+        """Have one programme solved; a comparison of solvers puts another one here."""
+        return template.solve(scaled, self.least_error)
 
     def refine(self, solution: ConvexSolution, reference: Array | None = None) -> tuple[ConvexSolution, int]:
         """Linearise anew until the true thrust bounds hold.

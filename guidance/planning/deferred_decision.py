@@ -3,8 +3,8 @@
 The branches share the first nodes of the flight: state, mass and thrust are the same variables there. Each
 candidate may cost no more than its own cheapest flight of the same time and a budget. The longest trunk that
 this allows keeps every candidate open for as long as possible; of the flights that have it, the one of least
-expected propellant is given. More shared nodes are more constraints, so the longest trunk is found by
-bisection, one second-order cone programme a step.
+expected propellant is given. More shared nodes are more constraints, so the longest trunk is found by a
+search outward from a likely length, one second-order cone programme a step.
 
 Source: Elango, Sarsilmaz and Acikmese, "Deferred-decision trajectory optimization", 2025; Hayner, Buckner et
 al., "HALO: hazard-aware landing optimization for autonomous systems", ICRA 2023.
@@ -12,7 +12,7 @@ al., "HALO: hazard-aware landing optimization for autonomous systems", ICRA 2023
 
 from __future__ import annotations
 
-from bisect import bisect_left
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -33,7 +33,30 @@ from guidance.validation import finite_number, finite_vector
 METHOD = "deferred decision"
 _MOST_REFINEMENTS = 4
 _LEAST_WEIGHT = 1e-2  # in the expected propellant, so that no branch is left without a price
+_LIKELY_SHARE = 0.75  # of the flight that is shared, where nothing is known of it
 _SLACK = 1e-7  # in ln(mass), on each budget: rounding of the solver
+
+
+@dataclass(frozen=True, eq=False)
+class TrunkOptions:
+    """How a trunk is planned.
+
+    Attributes:
+        nodes: N of every branch, trunk included.
+        weights: shape (k,), chance that each candidate will be the one; None for equal chances.
+        parting_time: [s] when the branches will part, as far as is known: the search starts there. It changes
+            nothing but the time that the search takes.
+    """
+
+    nodes: int = 21
+    weights: ArrayLike | None = None
+    parting_time: float | None = None
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        finite_number("nodes", self.nodes, at_least=3)
+        if self.parting_time is not None:
+            finite_number("parting_time", self.parting_time)
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,13 +84,14 @@ class DeferredDecision:
 
 @dataclass(frozen=True, eq=False)
 class _Question:
-    """One call: the candidates' problems, their numbers with the budgets, and their weights."""
+    """One call: the candidates' problems, their numbers with the budgets, their weights, a likely trunk."""
 
     problems: list[LandingProblem]
     time: float
     nodes: int
     limits: list[float]
     weights: Array
+    likely: int
 
     def solve(self, shared_nodes: int, log_mass: list[Array]) -> list[ConvexSolution] | None:
         """Branches that share some nodes; thrust bounds linearised at the log-masses."""
@@ -101,8 +125,7 @@ def plan_deferred(
     targets: ArrayLike,
     budget: float,
     time_of_flight: float,
-    nodes: int = 21,
-    weights: ArrayLike | None = None,
+    options: TrunkOptions = TrunkOptions(),
 ) -> DeferredDecision:
     """Keep every candidate open for as long as a budget of propellant allows.
 
@@ -111,8 +134,7 @@ def plan_deferred(
         targets: [m] shape (k, 3), the candidates, all at the altitude of the problem's target.
         budget: [kg] by which each branch may exceed that candidate's cheapest flight of the same time.
         time_of_flight: [s] of every branch.
-        nodes: N of every branch, trunk included.
-        weights: shape (k,), chance that each candidate will be the one; None for equal chances.
+        options: nodes, weights, and what is known of the trunk.
 
     Returns:
         The trunk and its branches.
@@ -127,7 +149,7 @@ def plan_deferred(
         raise ValueError("targets must lie at the altitude of the problem's target")
     finite_number("budget", budget, at_least=0.0)
     finite_number("time_of_flight", time_of_flight, above=0.0)
-    finite_number("nodes", nodes, at_least=3)
+    nodes, weights = options.nodes, options.weights
     chances = np.ones(len(sites)) if weights is None else finite_vector("weights", weights, len(sites))
     if (chances < 0.0).any() or not chances.any():
         raise ValueError("weights must not be negative, and not all zero")
@@ -143,7 +165,9 @@ def plan_deferred(
         return DeferredDecision((), 0, missing, solves)
     extra = -np.log1p(-budget / problem.state.mass)
     limits = [min(part.log_mass_ratio + extra, problem.log_mass_ratio) + _SLACK for part in alone]
-    question = _Question(problems, time_of_flight, nodes, limits, chances / chances.sum())
+    parting = _LIKELY_SHARE * time_of_flight if options.parting_time is None else options.parting_time
+    likely = 1 + math.ceil(parting / time_of_flight * (nodes - 1))  # seen nearer, branches part later
+    question = _Question(problems, time_of_flight, nodes, limits, chances / chances.sum(), likely)
     shared, flights, more = _longest_trunk(question, alone)
     plans = tuple(
         Plan.of_flight(
@@ -183,9 +207,21 @@ def _longest_trunk(question: _Question, alone: list[ConvexSolution]) -> tuple[in
             solves += more
         if found is None:
             return False
-        longest, flights = nodes, found  # each trunk that can be shared is longer than those before
+        if nodes > longest:
+            longest, flights = nodes, found
         return True
 
-    most = question.nodes if len(alone) == 1 else question.nodes - 1
-    bisect_left(range(most, 0, -1), True, key=shareable)
+    low, high = 0, 1 + (question.nodes if len(alone) == 1 else question.nodes - 1)
+    most, nodes, tried = high, min(max(question.likely, 1), high - 1), 0
+    while high - low > 1:
+        if shareable(nodes):
+            low = nodes
+        else:
+            high = nodes
+        if low == 0 or high == most:  # one end is not known yet
+            stride = 1 << max(tried - 1, 0)  # 1, 1, 2, 4, ...
+            nodes = max(high - stride, 1) if low == 0 else min(low + stride, most - 1)
+            tried += 1
+        else:
+            nodes = (low + high) // 2
     return longest, flights, solves

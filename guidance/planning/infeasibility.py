@@ -12,7 +12,6 @@ from guidance.convex.programme import ConvexSolution, convex_template
 from guidance.convex.scaling import scale_problem
 from guidance.descent.certificate import Certificate
 from guidance.descent.problem import LandingProblem
-from guidance.flight_time.primer_vector import find_primer_flight
 from guidance.flight_time.time_window import TimeWindow, forbidden_by, guess_time, time_window
 from guidance.lower_bound.proof import prove_no_flight
 from guidance.planning.convex_task import ConvexTask
@@ -68,24 +67,18 @@ def prove_fixed_time(task: ConvexTask, time: float) -> Certificate | None:
 
 
 def prove_by_dual_bound(problem: LandingProblem) -> Certificate | None:
-    """Proof that the tank does not pay for any flight to the target; None where the bound does not show it.
-
-    It is not tried where the indirect method finds a flight.
-    """
+    """Proof that the tank does not pay for any flight to the target; None where the bound shows none."""
     window = time_window(problem)
-    if window.empty or find_primer_flight(problem) is not None:
+    if window.empty:
         return None
     return prove_no_flight(problem, guess_time(problem, window))
 
 
-def prove_free_time(task: ConvexTask, also: tuple[float, ...] = ()) -> Certificate | ConvexSolution | None:
-    """Certificate for a free time of flight.
-
-    By the dual bound; else by closed-form bounds outside a window, and Farkas proofs inside.
+def prove_free_time(task: ConvexTask) -> Certificate | ConvexSolution | None:
+    """Certificate for a free time of flight: closed-form bounds outside a window, and Farkas proofs inside.
 
     Args:
         task: what was to be solved.
-        also: [s] further times to prove, such as the best one found.
 
     Returns:
         The certificate; or a solution, where a time on the grid turns out to be feasible; or None, where a
@@ -94,13 +87,8 @@ def prove_free_time(task: ConvexTask, also: tuple[float, ...] = ()) -> Certifica
     window = time_window(task.problem, task.free_landing_point)
     if window.empty:
         return _closed_form(window)
-    if not task.free_landing_point:
-        proof = prove_by_dual_bound(task.problem)
-        if proof is not None:
-            return proof
     proofs = []
-    times = np.union1d(window.grid(), np.array(also))
-    for time in times:
+    for time in window.grid():
         proof = prove_at(task, float(time))
         if isinstance(proof, FarkasProof):
             proofs.append(proof)

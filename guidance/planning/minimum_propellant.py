@@ -11,7 +11,7 @@ from guidance.arrays import Array
 from guidance.convex.clarabel_solver import SolveStatus
 from guidance.convex.programme import ConvexSolution
 from guidance.flight_time.bracket_search import BracketSearch
-from guidance.flight_time.primer_vector import find_primer_flight
+from guidance.flight_time.primer_vector import PrimerFlight
 from guidance.flight_time.search import TimeModel, TimeSearch
 from guidance.flight_time.time_window import TimeWindow, guess_time, time_window
 from guidance.planning.convex_task import MOST_REFINEMENTS, ConvexTask, bounds_hold
@@ -71,22 +71,24 @@ def minimise_over_time(
     tolerance: float = LOG_MASS_TOLERANCE,
     guess: float | None = None,
     coarse_first: bool = True,
+    flight: PrimerFlight | None = None,
 ) -> TimeOutcome:
     """Search the time of flight of least cost.
 
-    The indirect method guesses it, and one solve settles the matter where the dual solution says that no
-    other time is better by more than the tolerance. Elsewhere the time, the thrust bounds' linearisation and
-    the curvature of the cost come from a search on a coarse mesh first, so that one or two solves are left
-    for the fine one.
+    Where the indirect method has a flight to the target one solve at its time settles the matter, if the dual
+    solution says that no other time is better by more than the tolerance. Elsewhere the time, the thrust
+    bounds' linearisation and the curvature of the cost come from a search on a coarse mesh first, so that one
+    or two solves are left for the fine one.
 
     Args:
         task: what is solved at each time.
         tolerance: gain below which the search stops, in units of the task's cost.
-        guess: [s] time to start from where the indirect method has none; None for coast and brake.
+        guess: [s] time to start from without a flight; None for coast and brake.
         coarse_first: False where the guess is good enough to go without the coarse mesh.
+        flight: what the indirect method found; None where it found none, or the landing point is free.
     """
-    if not task.free_landing_point:
-        outcome = _search_from_primer(task, tolerance)
+    if flight is not None:
+        outcome = _search_from_primer(task, tolerance, flight)
         if outcome is not None:
             return outcome
     window = time_window(task.problem, task.free_landing_point)
@@ -182,11 +184,8 @@ def _evaluation(task: ConvexTask, reference: Array | None) -> Callable[[float], 
     return evaluate
 
 
-def _search_from_primer(task: ConvexTask, tolerance: float) -> TimeOutcome | None:
-    """Search from the indirect method's flight; None where it has none, or its time none on this mesh."""
-    flight = find_primer_flight(task.problem)
-    if flight is None:
-        return None
+def _search_from_primer(task: ConvexTask, tolerance: float, flight: PrimerFlight) -> TimeOutcome | None:
+    """Search from the indirect method's flight; None where its time has none on this mesh."""
     reference = flight.log_mass(task.nodes)
     first = task.solve(flight.time, reference)
     if not first.solved:

@@ -2,8 +2,9 @@
 
 The reference is sampled at the control instants. Over each period the feedforward is the mean thrust
 acceleration that takes the reference's velocity from one instant to the next, so that a held thrust has its
-velocity at each. The feedback is a discrete linear-quadratic regulator of the double integrator that
-remains, the same on each axis:
+velocity at each; a plan's flight is first made one that held thrusts fly, so that it has its position too.
+The feedback is a discrete linear-quadratic regulator of the double integrator that remains, the same on each
+axis:
 
     u_k = a_k - K_r (r - r_k) - K_v (v - v_k),    thrust = m u_k / (1 + e),
 
@@ -17,7 +18,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from guidance.arrays import Array
-from guidance.descent.plan import Plan
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,25 +63,46 @@ class TrackingReference:
         )
 
 
-def states_at(plan: Plan, times: Array) -> tuple[Array, Array]:
-    """Position and velocity of a plan at given times, exact for its first-order hold.
+def hold_thrust(
+    position: Array, velocity: Array, control_period: float, gravity: Array
+) -> tuple[Array, Array]:
+    """What thrusts held over control periods make of a flight that is known at the control instants.
+
+    Held over a period in which the engine switches, the mean thrust leads to the flight's velocity but not to
+    its position. Each held thrust is the mean of its period and a correction, the least that leads to the
+    flight's end (squares weighted by one over the squared mean: an engine that is off stays off).
 
     Args:
-        plan: with a flight.
-        times: [s] shape (k,), from 0 to the plan's end.
+        position: [m] shape (n, 3).
+        velocity: [m/s] shape (n, 3).
+        control_period: [s] between nodes.
+        gravity: [m/s^2] shape (3,).
 
     Returns:
-        Position [m] and velocity [m/s], shape (k, 3) each.
+        Position [m] and velocity [m/s] at the control instants, shape (n, 3) each; as they came where less
+        than two periods have thrust.
     """
-    step = plan.time[1]
-    k = np.clip((times / step).astype(np.int64), 0, plan.nodes - 2)
-    s = (times - k * step)[:, None]
-    thrust = plan.thrust / plan.mass[:, None]
-    now = thrust[k] + plan.problem.gravity
-    rise = (thrust[k + 1] - thrust[k]) / step
-    position = plan.position[k] + plan.velocity[k] * s + now * s**2 / 2.0 + rise * s**3 / 6.0
-    velocity = plan.velocity[k] + now * s + rise * s**2 / 2.0
-    return position, velocity
+    mean = np.diff(velocity, axis=0) / control_period
+    weight = ((mean - gravity) ** 2).sum(axis=1)
+    left = control_period * (np.arange(len(mean), 0.0, -1.0) - 0.5)
+    lever = left - float(weight @ left) / max(float(weight.sum()), 1e-12)
+    gain = control_period * float(weight @ lever**2)
+    if gain < 1e-6 * control_period * float(weight.sum()) * control_period**2:
+        return position, velocity
+    flown, _ = _fly_held(position[0], velocity[0], mean, control_period)
+    missing = position[-1] - flown[-1]
+    return _fly_held(
+        position[0], velocity[0], mean + (weight * lever)[:, None] * (missing / gain), control_period
+    )
+
+
+def _fly_held(
+    position: Array, velocity: Array, acceleration: Array, control_period: float
+) -> tuple[Array, Array]:
+    """States at the control instants under accelerations that are held between them."""
+    speed = np.vstack([velocity, velocity + control_period * np.cumsum(acceleration, axis=0)])
+    steps = 0.5 * control_period * (speed[1:] + speed[:-1])
+    return np.vstack([position, position + np.cumsum(steps, axis=0)]), speed
 
 
 def make_reference(

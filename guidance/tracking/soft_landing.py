@@ -25,7 +25,7 @@ from guidance.descent.problem import LandingProblem, lies_below
 from guidance.lander import Lander
 from guidance.pdg.solve import PlanningMethod, replan
 from guidance.state import State
-from guidance.tracking.reference import TrackingReference, make_reference, states_at
+from guidance.tracking.reference import TrackingReference, hold_thrust, make_reference
 from guidance.validation import finite_number, finite_vector
 
 
@@ -49,7 +49,7 @@ class SoftLandingOptions:
     terminal_deceleration: float = 1.5
     speed_limit: float | None = None
     nodes: int = 31
-    method: PlanningMethod = "convex"
+    method: PlanningMethod = "auto"
     pointing_margin: float = 0.1
 
     def __post_init__(self) -> None:
@@ -211,7 +211,8 @@ def sample_descent(
     """
     periods = round(plan.time_of_flight / control_period)
     times = control_period * np.arange(periods + 1)
-    position, velocity = states_at(plan, np.minimum(times, plan.time_of_flight))
+    flown = plan.states_at(np.minimum(times, plan.time_of_flight))
+    position, velocity = hold_thrust(*flown, control_period, plan.problem.gravity)
     drift = np.array([0.0, 0.0, -sinking])
     position = position + drift * (times - plan.time_of_flight)[:, None]
     velocity = velocity + drift

@@ -10,6 +10,7 @@ from guidance.exports import lazy_exports
 
 if TYPE_CHECKING:
     from hda.flight.episode import advance, begin_flight, fly, fly_legs, observe
+    from hda.flight.episode_row import EpisodeRow, summarize_episode
     from hda.flight.outcome import Ending, Outcome
     from hda.flight.record import EpisodeRecord
     from hda.flight.vehicle import FlightErrors, FlightStatus, Segment, fly_interval
@@ -21,6 +22,10 @@ _HOMES = {
         "observe",
         "advance",
         "begin_flight",
+    ),
+    "hda.flight.episode_row": (
+        "EpisodeRow",
+        "summarize_episode",
     ),
     "hda.flight.outcome": (
         "Ending",
@@ -38,6 +43,7 @@ _HOMES = {
 __all__ = [
     "Ending",
     "EpisodeRecord",
+    "EpisodeRow",
     "FlightErrors",
     "FlightStatus",
     "Outcome",
@@ -48,6 +54,7 @@ __all__ = [
     "fly_interval",
     "fly_legs",
     "observe",
+    "summarize_episode",
 ]
 
 __getattr__, __dir__ = lazy_exports(

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from guidance.arrays import Array
 from guidance.descent.plan import PlanStatus
-from guidance.planning.deferred_decision import DeferredDecision, plan_deferred
+from guidance.planning.deferred_decision import DeferredDecision, TrunkOptions, plan_deferred
 from guidance.tracking.reference import TrackingReference
 from guidance.tracking.regulator import tracking_gains
 from guidance.tracking.soft_landing import SoftLanding, plan_soft_landing, sample_descent
@@ -78,12 +78,14 @@ class DeferredDecisionMemory:
         descent: memory of the guidance law.
         belief: from all looks so far; None before the first.
         committed: whether the branches have parted.
+        parting_time: [s] when they will, as planned at the last look and counted from this one; None before.
     """
 
     view: ScenarioView
     descent: DescentMemory
     belief: SafetyBelief | None = None
     committed: bool = False
+    parting_time: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,6 +110,14 @@ class Candidates:
         """Those not numbered."""
         kept = [k for k in range(len(self.sites)) if k not in numbers]
         return Candidates(self.sites[kept], self.probability[kept])
+
+
+@dataclass(frozen=True, eq=False)
+class _Trunk:
+    """The flight to the first candidate, and the time [s] at which the others' part from it."""
+
+    reference: TrackingReference
+    parting_time: float
 
 
 @dataclass(frozen=True)
@@ -146,10 +156,10 @@ class DeferredDecisionPolicy:
             return self._fly_to(observation.target, observation, memory)
         price = self._ranking().price(observation, memory.view, belief)
         candidates = self._choose(price, landing, observation, belief)
-        reference = None if memory.committed else self._defer(observation, candidates, memory)
-        if reference is None:
+        trunk = None if memory.committed else self._defer(observation, candidates, memory)
+        if trunk is None:
             return self._fly_to(candidates.sites[0], observation, replace(memory, committed=True))
-        return self._track(reference, candidates.sites[0], memory)
+        return self._track(trunk, candidates.sites[0], memory)
 
     def _ranking(self) -> HazardAwareSite:
         """The objective of `hazard_aware` without the looks to come: deferral stands in for them."""
@@ -190,23 +200,26 @@ class DeferredDecisionPolicy:
 
     def _defer(
         self, observation: Observation, candidates: Candidates, memory: DeferredDecisionMemory
-    ) -> TrackingReference | None:
+    ) -> _Trunk | None:
         """The trunk and its first branch; None where the trunk does not reach the next look."""
         view, planned = memory.view, self.descent.planned
         landing = self._soft_landing(observation, candidates.sites[0], view)
         if landing is None or landing.status is not PlanStatus.OPTIMAL or landing.plan is None:
             return None
-        answer = self._branch(landing, candidates)
+        answer = self._branch(landing, candidates, memory.parting_time)
         if len(answer.unreachable) > 0 and 0 not in answer.unreachable:
             candidates = candidates.without(answer.unreachable)
-            answer = self._branch(landing, candidates)
+            answer = self._branch(landing, candidates, memory.parting_time)
         if len(answer.plans) < 2 or answer.parting_time < view.decision_interval:
             return None
         options = planned.options
         sinking = options.terminal_deceleration * options.terminal_periods * view.control_period
-        return sample_descent(answer.plans[0], sinking, view.control_period, options)
+        reference = sample_descent(answer.plans[0], sinking, view.control_period, options)
+        return _Trunk(reference, answer.parting_time)
 
-    def _branch(self, landing: SoftLanding, candidates: Candidates) -> DeferredDecision:
+    def _branch(
+        self, landing: SoftLanding, candidates: Candidates, parting_time: float | None
+    ) -> DeferredDecision:
         """The programme, in the frame of the plan to the first candidate's gate."""
         assert landing.plan is not None
         gate = landing.plan.problem.target
@@ -215,8 +228,7 @@ class DeferredDecisionPolicy:
             gate + (candidates.sites - candidates.sites[0]),
             self.options.budget,
             landing.plan.time_of_flight,
-            self.options.nodes,
-            candidates.chances,
+            TrunkOptions(self.options.nodes, candidates.chances, parting_time),
         )
 
     def _soft_landing(self, observation: Observation, site: Array, view: ScenarioView) -> SoftLanding | None:
@@ -230,12 +242,14 @@ class DeferredDecisionPolicy:
         return plan_soft_landing(state, site, view.lander, view.control_period, options, view.gravity)
 
     def _track(
-        self, reference: TrackingReference, site: Array, memory: DeferredDecisionMemory
+        self, trunk: _Trunk, site: Array, memory: DeferredDecisionMemory
     ) -> tuple[Decision, DeferredDecisionMemory]:
-        view = memory.view
+        view, reference = memory.view, trunk.reference
         command = PlanCommand(reference, tracking_gains(view.control_period, self.descent.planned.weights))
         descent = replace(memory.descent, site=site.copy(), reference=reference.after(view.control_periods))
-        return Decision(site, command, DecisionStatus.NOMINAL), replace(memory, descent=descent)
+        left = trunk.parting_time - view.decision_interval
+        memory = replace(memory, descent=descent, parting_time=left)
+        return Decision(site, command, DecisionStatus.NOMINAL), memory
 
     def _fly_to(
         self, site: Array, observation: Observation, memory: DeferredDecisionMemory

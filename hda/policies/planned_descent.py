@@ -108,5 +108,5 @@ def _load_planner(options: SoftLandingOptions, weights: TrackingWeights, control
     """Plan a descent once per process: compiled code is loaded and the programme's sparsity is set up."""
     tracking_gains(control_period, weights)
     state = State(np.array([200.0, 100.0, 900.0]), np.array([-8.0, -4.0, -30.0]), 1200.0)
-    if options.method == "convex":
+    if options.method in ("auto", "convex"):
         plan_soft_landing(state, np.zeros(3), Lander(), control_period, options)

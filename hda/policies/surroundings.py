@@ -39,10 +39,10 @@ def _class_of_square() -> NDArray[np.int64]:
     return np.searchsorted(DISTANCE_EDGES, np.sqrt(np.arange(LARGEST_DISTANCE**2 + 1)))
 
 
-def squared_distance(marked: NDArray[np.bool_]) -> NDArray[np.int32]:
-    """[m^2] squared distance from each cell to the nearest marked one, at most LARGEST_DISTANCE squared."""
+def squared_distance(marked: NDArray[np.bool_], limit: int = LARGEST_DISTANCE) -> NDArray[np.int32]:
+    """[m^2] squared distance from each cell to the nearest marked one, at most `limit` [m] squared."""
     out = np.empty(marked.shape, dtype=np.int32)
-    _squared_distance_into(marked, LARGEST_DISTANCE, out)
+    _squared_distance_into(marked, limit, out)
     return out
 
 

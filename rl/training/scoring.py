@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from hda.flight.episode import fly
+from hda.flight.episode_row import summarize_episode
 from hda.policy import Policy
 from hda.task.presets import Preset
 from hda.task.scenario import sample_scenario
@@ -57,19 +58,20 @@ def score_policy(policy: Policy[Any], preset: Preset, split: str, study_seed: in
         study_seed: seed of the study.
         episodes: how many.
     """
-    rows = []
-    for episode in range(episodes):
-        record = fly(policy, sample_scenario(preset, study_seed, episode, split))
-        outcome = record.outcome
-        rows.append(
-            (
-                100.0 * outcome.safe_site,
-                100.0 * outcome.success,
-                record.total_reward,
-                outcome.touchdown_speed,
-                outcome.miss_distance,
-                100.0 * outcome.propellant_fraction,
-                len(record.decisions),
-            )
+    flights = (
+        summarize_episode(fly(policy, sample_scenario(preset, study_seed, episode, split)))
+        for episode in range(episodes)
+    )
+    rows = [
+        (
+            100.0 * row.safe_site,
+            100.0 * row.success,
+            row.reward,
+            row.touchdown_speed_mps,
+            row.miss_distance_m,
+            row.propellant_percent,
+            row.decisions,
         )
+        for row in flights
+    ]
     return Score(episodes, *(float(mean) for mean in np.mean(rows, axis=0)))

@@ -9,16 +9,13 @@ from typing import TYPE_CHECKING
 from guidance.exports import lazy_exports
 
 if TYPE_CHECKING:
-    from studies.campaign.rows import EpisodeRow
     from studies.campaign.study_folder import StudyFolder
 
 _HOMES = {
-    "studies.campaign.rows": ("EpisodeRow",),
     "studies.campaign.study_folder": ("StudyFolder",),
 }
 
 __all__ = [
-    "EpisodeRow",
     "StudyFolder",
 ]
 

@@ -23,13 +23,17 @@ def one_line_errors() -> Iterator[None]:
 
 
 @contextmanager
-def resumable() -> Iterator[None]:
-    """As `one_line_errors`; a study that the user stops says how it goes on, and exits with code 130."""
+def resumable(way: str = "--resume goes on") -> Iterator[None]:
+    """As `one_line_errors`; a study that the user stops says how it goes on, and exits with code 130.
+
+    Args:
+        way: how, in words.
+    """
     try:
         with one_line_errors():
             yield
     except KeyboardInterrupt:
-        Console(stderr=True).print("stopped; finished episodes are kept, --resume goes on", style="yellow")
+        Console(stderr=True).print(f"stopped; finished work is kept, {way}", style="yellow")
         sys.exit(130)
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from itertools import islice
 from pathlib import Path
 
-from studies.campaign.rows import ROW_COLUMNS, EpisodeRow
+from hda.flight.episode_row import ROW_COLUMNS, EpisodeRow
 from studies.columns import file_number
 
 _ROWS_AT_ONCE = 5000  # rows of a group of the Parquet file

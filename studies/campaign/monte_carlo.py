@@ -17,13 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hda.flight.episode import fly
+from hda.flight.episode_row import EpisodeRow, summarize_episode
 from hda.ground.library import Ground, prepare_tiles
 from hda.policies.entry import AnyPolicy
 from hda.registry import make_policy, policy_entry
 from hda.task.presets import Preset
 from hda.task.scenario import sample_scenario
 from studies.campaign.executor import ClusterExecutor, OpenExecutor, WorkerDiedError, advise_script
-from studies.campaign.rows import EpisodeRow, summarize_episode
 
 CHUNK_EPISODES = 10
 MOST_CHUNKS = 10_000

@@ -1,4 +1,4 @@
-"""Several studies in one run, each in a folder of its own under one progress bar; finished work is kept."""
+"""Flying what the folders of studies lack: of one, or of several in one run under one progress bar."""
 
 from __future__ import annotations
 
@@ -8,15 +8,16 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
+from hda.flight.episode_row import EpisodeRow
+from studies.campaign.claimed_folder import Existing
 from studies.campaign.episode_files import write_episodes
-from studies.campaign.executor import local_processes
-from studies.campaign.missing_chunks import find_missing, fly_missing
-from studies.campaign.monte_carlo import Study, join_chunks, prepare_study
+from studies.campaign.executor import OpenExecutor, local_processes
+from studies.campaign.monte_carlo import Study, chunk_bounds, fly_chunks, join_chunks, prepare_study
 from studies.campaign.provenance import describe_study, write_provenance
-from studies.campaign.rows import EpisodeRow
-from studies.campaign.study_folder import Existing, StudyFolder, open_study_folder
+from studies.campaign.study_folder import StudyFolder, open_study_folder
 
 Rows = dict[str, tuple[EpisodeRow, ...]]
 """Policy -> its rows, episodes ascending."""
@@ -33,6 +34,45 @@ class Point:
 
     label: str
     study: Study
+
+
+def find_missing(folder: StudyFolder) -> list[tuple[int, int]]:
+    """Bounds of the chunks to fly; those that are damaged are removed, and named on stderr."""
+    finished, damages = folder.find_finished()
+    for damage in damages:
+        Console(stderr=True).print(f"flown again: {damage}", style="yellow", markup=False, highlight=False)
+    return [bounds for bounds in chunk_bounds(folder.study) if bounds not in finished]
+
+
+def fly_missing(
+    folder: StudyFolder,
+    missing: Sequence[tuple[int, int]],
+    open_executor: OpenExecutor,
+    workers: int,
+    bar: tuple[Progress, TaskID],
+) -> None:
+    """Fly chunks; each goes to the folder at once, so that a stopped study goes on.
+
+    Args:
+        folder: open folder of the study.
+        missing: (first episode, one past the last) of each chunk.
+        open_executor: makes what runs them.
+        workers: processes, unless the executor counts them itself.
+        bar: counts flights; it is moved on by those that stand in the folder already.
+
+    Raises:
+        ValueError: a policy or a worker failed.
+    """
+    progress, task = bar
+    each = len(folder.study.policies)
+    lacking = sum(last - first for first, last in missing)
+    progress.advance(task, (folder.study.episodes - lacking) * each)
+    for chunk in fly_chunks(folder.study, missing, open_executor, workers=workers):
+        folder.store(chunk)
+        progress.advance(task, (chunk.last - chunk.first) * each)
+        if chunk.attempts > 1:
+            again = f"a worker died: episodes {chunk.first} to {chunk.last - 1} were flown again"
+            progress.console.print(again)
 
 
 def fly_points(out: Path, points: Sequence[Point], existing: Existing, workers: int) -> dict[str, Rows]:

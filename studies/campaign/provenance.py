@@ -83,20 +83,32 @@ def identify_software(paths: tuple[str, ...] = ()) -> dict[str, Any]:
     }
 
 
+def identify_run(wing: Path, decided: dict[str, Any], paths: tuple[str, ...] = ()) -> dict[str, Any]:
+    """All that decides the rows of a run that is no single study: options, versions, digests of the sources.
+
+    Args:
+        wing: folder of the study's own code, which works out the rows.
+        decided: the options that decide a row, whichever rows are asked for.
+        paths: paths `package.module:Name` of policies that are not registered.
+    """
+    return {"options": decided, **identify_software(paths), "wing": digest_files(wing)}
+
+
 def digest_sources(paths: tuple[str, ...]) -> dict[str, str]:
     """Package -> digest of every file in it, weights included; also the module of a policy given by path."""
     root = Path(__file__).resolve().parents[1]
-    digests = {name: _digest(root.parent / name) for name in ("guidance", "hda", "rl")}
-    digests["studies"] = _digest(root / "campaign" / "monte_carlo.py", root / "campaign" / "rows.py")
+    digests = {name: digest_files(root.parent / name) for name in ("guidance", "hda", "rl")}
+    digests["studies"] = digest_files(root / "campaign" / "monte_carlo.py")
     for path in paths:
         module = path.partition(":")[0]
         found = importlib.util.find_spec(module)
         if found is not None and found.origin is not None:
-            digests[module] = _digest(Path(found.origin))
+            digests[module] = digest_files(Path(found.origin))
     return digests
 
 
-def _digest(*places: Path) -> str:
+def digest_files(*places: Path) -> str:
+    """Digest of files, and of every file in folders; compiled ones left out."""
     total = hashlib.sha256()
     for place in places:
         files = [place] if place.is_file() else sorted(p for p in place.rglob("*") if p.is_file())

@@ -9,25 +9,44 @@ from typing import Annotated
 import tyro
 
 from guidance.validation import finite_number
-from studies.campaign.study_folder import Existing
+from studies.campaign.claimed_folder import Existing
 
 
 @dataclass(frozen=True, kw_only=True)
-class FolderOptions:
-    """Options of a run that keeps finished work in a folder.
+class KeepingOptions:
+    """Options of a run that keeps finished work.
 
     Attributes:
-        out: folder for results.
         resume: keep finished work of the same study in the folder, and do what is missing.
+        overwrite: replace the study in the folder.
     """
 
-    out: Path
     resume: bool = False
+    overwrite: bool = False
 
     @property
     def existing(self) -> Existing:
-        """What to do with a folder that holds a study."""
-        return Existing.RESUME if self.resume else Existing.REFUSE
+        """What to do with a folder that holds a study.
+
+        Raises:
+            ValueError: two answers were given.
+        """
+        if self.resume and self.overwrite:
+            raise ValueError("resume and overwrite exclude each other")
+        if self.resume:
+            return Existing.RESUME
+        return Existing.OVERWRITE if self.overwrite else Existing.REFUSE
+
+
+@dataclass(frozen=True, kw_only=True)
+class FolderOptions(KeepingOptions):
+    """Options of a run that keeps finished work in a folder with a name of its own.
+
+    Attributes:
+        out: folder for results.
+    """
+
+    out: Path
 
 
 @dataclass(frozen=True, kw_only=True)

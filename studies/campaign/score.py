@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.campaign.rows import MEASURES, RATIOS, EpisodeRow
+from hda.flight.episode_row import MEASURES, RATIOS, EpisodeRow
 from studies.columns import Column, Output
 from studies.statistics.moments import TileMoments, mean_intervals
 from studies.statistics.ratios import Interval, clustered_count_interval, wilson_interval

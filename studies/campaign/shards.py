@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
+from hda.flight.episode_row import ROW_COLUMNS, EpisodeRow
 from studies.campaign.monte_carlo import Chunk
-from studies.campaign.rows import ROW_COLUMNS, EpisodeRow
 
 SHARD_FORMAT = 1
 _COLUMN_TYPES: dict[str, type] = {"str": str, "int": int, "bool": bool, "float": float}

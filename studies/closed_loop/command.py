@@ -18,13 +18,13 @@ from rich.console import Console
 
 from guidance.console import tolerate_encoding
 from guidance.validation import finite_number
+from hda.flight.episode_row import EpisodeRow
 from hda.registry import policy_entry
 from hda.task.presets import find_preset
 from studies.campaign.command_line import open_folder, resumable
 from studies.campaign.monte_carlo import Study
 from studies.campaign.points import Point, fly_points
 from studies.campaign.provenance import describe_run, write_provenance
-from studies.campaign.rows import EpisodeRow
 from studies.campaign.run_options import FolderOptions
 from studies.campaign.score import FALLBACKS_COLUMN, PROPELLANT_COLUMN, RATIO_COLUMNS, Score, score_rows
 from studies.closed_loop.laws import law_name, law_path

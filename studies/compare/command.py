@@ -25,10 +25,11 @@ from hda.task.presets import Preset, find_preset
 from studies.campaign.command_line import choose_policies, open_folder, resumable
 from studies.campaign.episode_files import write_episodes
 from studies.campaign.executor import OpenExecutor, local_processes
-from studies.campaign.missing_chunks import find_missing, fly_missing
 from studies.campaign.monte_carlo import Study, prepare_study
+from studies.campaign.points import find_missing, fly_missing
 from studies.campaign.provenance import describe_study, write_provenance
-from studies.campaign.study_folder import Existing, StudyFolder, open_study_folder
+from studies.campaign.run_options import KeepingOptions
+from studies.campaign.study_folder import StudyFolder, open_study_folder
 from studies.compare.differences import compare_pairs, write_paired
 from studies.compare.report import ReportContent, fly_report_flights, write_report
 from studies.compare.scores import StudyScores, score_study
@@ -45,7 +46,7 @@ from studies.contract import check_contract
 
 
 @dataclass(frozen=True)
-class Comparison:
+class Comparison(KeepingOptions):
     """Command line of the comparison.
 
     Attributes:
@@ -70,7 +71,6 @@ class Comparison:
         slurm_jobs: jobs to submit.
         out: folder for results; results/PRESET by default.
         resume: go on with the study in the folder, which must be the same; begins it where there is none.
-        overwrite: replace the study in the folder.
         figures: draw the histograms and trajectories.
         report: write report.html, and keep the flights that it shows.
     """
@@ -90,8 +90,6 @@ class Comparison:
     slurm: bool = False
     slurm_jobs: int = 1
     out: Path | None = None
-    resume: bool = False
-    overwrite: bool = False
     figures: bool = True
     report: bool = True
 
@@ -133,19 +131,6 @@ def choose_ground(options: Comparison) -> tuple[Preset, str]:
         workers=options.workers,
     )
     return preset, OWN_SPLIT
-
-
-def choose_existing(options: Comparison) -> Existing:
-    """What to do with a folder that holds a study.
-
-    Raises:
-        ValueError: two answers were given.
-    """
-    if options.resume and options.overwrite:
-        raise ValueError("resume and overwrite exclude each other")
-    if options.resume:
-        return Existing.RESUME
-    return Existing.OVERWRITE if options.overwrite else Existing.REFUSE
 
 
 def choose_executor(options: Comparison) -> tuple[OpenExecutor, bool]:
@@ -207,7 +192,7 @@ def compare(options: Comparison) -> list[PolicySummary]:
         OSError: the folder cannot be written.
     """
     study = plan_study(options)
-    existing = choose_existing(options)
+    existing = options.existing
     choose_executor(options)
     for path in study.paths:
         check_contract(policy_entry(path).make, study.preset)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from studies.campaign.rows import MEASURES, RATIOS
+from hda.flight.episode_row import MEASURES, RATIOS
 from studies.campaign.score import MEASURE_COLUMNS, RATIO_COLUMNS, Score, scaled
 from studies.columns import Column, Output, format_p, write_csv
 from studies.compare.scores import StudyScores

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.campaign.rows import MEASURES, EpisodeRow
+from hda.flight.episode_row import MEASURES, EpisodeRow
 
 BINS = 40
 EPISODES_BEFORE_BINS = 10_000

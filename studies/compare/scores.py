@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
+from hda.flight.episode_row import MEASURES, RATIOS, EpisodeRow
 from studies.campaign.monte_carlo import Chunk
-from studies.campaign.rows import MEASURES, RATIOS, EpisodeRow
 from studies.campaign.score import RunningScore, measured
 from studies.compare.histograms import DecisionTimes, MeasureHistograms
 from studies.statistics.moments import TileMoments

@@ -10,8 +10,9 @@ from __future__ import annotations
 import json
 from collections import Counter
 from dataclasses import asdict, dataclass, replace
+from io import BytesIO
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import tyro
 from rich.console import Console
@@ -20,19 +21,29 @@ from rich.progress import track
 from guidance.console import tolerate_encoding
 from guidance.validation import finite_number, unknown_name
 from hda.flight.episode import fly
-from hda.flight.outcome import ENDINGS
 from hda.task.presets import PRESETS, Preset
 from hda.task.scenario import sample_scenario
-from studies.campaign.command_line import one_line_errors, open_folder
+from studies.campaign.command_line import open_folder, resumable
+from studies.campaign.journal import Journal, open_journal
 from studies.campaign.monte_carlo import Study
-from studies.campaign.provenance import describe_run, write_provenance
-from studies.campaign.shards import read_shard
-from studies.columns import Column, field_columns, write_csv
-from studies.failures.causes import Cause, Failure, explain_failure, find_remedies
+from studies.campaign.provenance import describe_run, identify_run, write_provenance
+from studies.campaign.run_options import KeepingOptions
+from studies.campaign.shards import read_shard, write_durably
+from studies.columns import write_csv
+from studies.failures.causes import Failure, explain_failure, find_remedies
+from studies.failures.table import COLUMNS, describe_failure, picture_name, write_markdown
+
+_PRODUCTS = (
+    "failures.csv",
+    "failures.md",
+    "provenance.json",
+    "*-[0-9][0-9][0-9][0-9][0-9][0-9].png",
+    ".*.png.*",
+)
 
 
 @dataclass(frozen=True)
-class Failures:
+class Failures(KeepingOptions):
     """Command line.
 
     Attributes:
@@ -107,28 +118,12 @@ def _changed(held: object, today: object, name: str = "preset") -> str:
     return "" if held == today else name
 
 
-def describe_failure(failure: Failure) -> str:
-    """The cause in a sentence or two."""
-    words = f"{ENDINGS[failure.ending].capitalize()} ({failure.touchdown_speed_mps:.2f} m/s)."
-    words += f" {failure.cause.value[0].upper()}{failure.cause.value[1:]}."
-    if failure.cause in (Cause.MISREAD, Cause.KNOWN_HAZARD, Cause.BETWEEN_PIXELS):
-        words += f" It read {failure.last_reading:.2f}, {failure.last_reading_s:.1f} s before touchdown."
-    if failure.safe_cells_seen:
-        words += (
-            f" Looks had shown {failure.safe_cells_seen} safe cells,"
-            f" {failure.safe_cells_in_reach} of them within reach."
-        )
-    words += f" The site last changed {failure.last_change_s:.1f} s before touchdown."
-    if failure.remedies:
-        words += f" A success with {' or with '.join(failure.remedies)}."
-    return words
-
-
 def show_failures(options: Failures) -> dict[str, list[Failure]]:
     """Explain and draw the failures of a study.
 
     Raises:
-        ValueError: the folder holds no study that can be flown again, or a policy is not in it.
+        ValueError: the folder holds no study that can be flown again, a policy is not in it, or the folder
+            for results holds other failures.
         OSError: the folder cannot be written.
     """
     study, failed = read_study(options.study)
@@ -139,63 +134,65 @@ def show_failures(options: Failures) -> dict[str, list[Failure]]:
     out = open_folder(options.out or options.study / "failures")
     explained: dict[str, list[Failure]] = {name: [] for name in chosen}
     pairs = [(name, episode) for name in chosen for episode in failed[name][: options.most]]
-    for name, episode in track(pairs, "failures", transient=True):
-        record = fly(
-            study.make_policy(name), sample_scenario(study.preset, study.study_seed, episode, study.split)
-        )
-        failure = explain_failure(record)
-        failure = replace(failure, remedies=find_remedies(study, name, record))
-        explained[name].append(failure)
-        if options.figures:
-            from studies.failures.picture import draw_failure
-
-            figure = draw_failure(record, describe_failure(failure))
-            figure.savefig(out / picture_name(name, episode), dpi=75)
-    rows = [(name, failure) for name, failures in explained.items() for failure in failures]
-    write_csv(out / "failures.csv", COLUMNS, rows)
-    flown = {name: len(failed[name]) for name in chosen}
-    write_markdown(out / "failures.md", study, explained, flown, options.figures)
-    write_provenance(out / "provenance.json", describe_run(options))
+    with open_journal(out, Failure, _PRODUCTS, identify_failures(study), options.existing) as journal:
+        for name, episode in track(pairs, "failures", transient=True):
+            picture = out / picture_name(name, episode) if options.figures else None
+            explained[name].append(show_failure(study, name, episode, journal, picture))
+        rows = [(name, failure) for name, failures in explained.items() for failure in failures]
+        write_csv(out / "failures.csv", COLUMNS, rows)
+        flown = {name: len(failed[name]) for name in chosen}
+        write_markdown(out / "failures.md", study, explained, flown, options.figures)
+        write_provenance(out / "provenance.json", {**describe_run(options), "work": journal.describe()})
     return explained
 
 
-def picture_name(policy: str, episode: int) -> str:
-    """File name of a failure's picture."""
-    return f"{policy}-{episode:06d}.png"
+def identify_failures(study: Study) -> dict[str, Any]:
+    """All that decides what a failed episode is: how many of them there are does not."""
+    decided = {
+        "preset": study.preset.name,
+        "study_seed": study.study_seed,
+        "split": study.split,
+        "paths": list(study.paths),
+    }
+    return identify_run(Path(__file__).parent, decided, study.paths)
 
 
-COLUMNS: tuple[Column[tuple[str, Failure]], ...] = (
-    Column("policy", "policy", lambda row: row[0]),
-    *(column.through(lambda row: row[1]) for column in field_columns(Failure) if column.key != "remedies"),
-    Column("remedies", "remedies", lambda row: "; ".join(row[1].remedies)),
-)
-"""failures.csv: policy and failure, a field a column."""
+def show_failure(
+    study: Study, policy: str, episode: int, journal: Journal[Failure], picture: Path | None
+) -> Failure:
+    """Explain a failed episode and draw it, as far as that is not done; it is flown again for either.
 
+    Args:
+        study: what was flown.
+        policy: its name.
+        episode: number.
+        journal: of explained failures; the explanation goes there at once.
+        picture: file of the picture, drawn where it is missing; None for none.
+    """
+    key, lacks_picture = (policy, episode), picture is not None and not picture.exists()
+    found = journal.find(key)
+    if found is not None and not lacks_picture:
+        return found
+    scenario = sample_scenario(study.preset, study.study_seed, episode, study.split)
+    record = fly(study.make_policy(policy), scenario)
 
-def write_markdown(
-    path: Path, study: Study, explained: dict[str, list[Failure]], failed: dict[str, int], figures: bool
-) -> None:
-    """Write the causes counted, then every failure."""
-    lines = [
-        f"Failed episodes, preset {study.preset.name}, split {study.split}, study seed {study.study_seed}"
-    ]
-    for policy, failures in explained.items():
-        shown = f"the first {len(failures)}" if len(failures) < failed[policy] else "all"
-        lines += ["", f"## {policy}: {failed[policy]} failed, {shown} shown", ""]
-        counts = Counter(failure.cause.value for failure in failures)
-        lines += [f"- {count} x {cause}" for cause, count in counts.most_common()]
-        lines += ["", "| episode | tile | ending | why |", "|---:|---:|---|---|"]
-        for failure in failures:
-            number = str(failure.episode)
-            link = f"[{number}]({picture_name(policy, failure.episode)})" if figures else number
-            lines.append(f"| {link} | {failure.tile} | {failure.ending} | {describe_failure(failure)} |")
-    path.write_text("\n".join(lines) + "\n")
+    def explain() -> Failure:
+        return replace(explain_failure(record), remedies=find_remedies(study, policy, record))
+
+    failure = journal.finish(key, explain)
+    if picture is not None and lacks_picture:
+        from studies.failures.picture import draw_failure
+
+        drawn = BytesIO()
+        draw_failure(record, describe_failure(failure)).savefig(drawn, dpi=75)
+        write_durably(picture, drawn.getvalue())
+    return failure
 
 
 def main() -> None:
     """Command line; a wrong option is one line on stderr and exit code 2."""
     tolerate_encoding()
-    with one_line_errors():
+    with resumable():
         options = tyro.cli(Failures, description=__doc__)
         explained = show_failures(options)
         console = Console()

@@ -34,7 +34,7 @@ from hda.task.presets import find_preset
 from rl.policies.actor import shipped, weights_name
 from rl.settings import RECIPES
 from rl.training.candidates import Choice
-from studies.campaign.command_line import one_line_errors, open_folder
+from studies.campaign.command_line import open_folder, resumable
 from studies.campaign.provenance import describe_run, write_provenance
 from studies.columns import write_csv
 from studies.memory.answer import GroupRow, compare_groups, conclude
@@ -209,5 +209,5 @@ def study_memory(options: MemoryStudy) -> tuple[GroupRow, ...]:
 def main() -> None:
     """Command line; a wrong option is one line on stderr and exit code 2."""
     tolerate_encoding()
-    with one_line_errors():
+    with resumable("the same command goes on"):
         study_memory(tyro.cli(MemoryStudy, description=__doc__))

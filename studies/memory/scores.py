@@ -6,6 +6,7 @@ import csv
 import json
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, fields
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from rl.policies.actor import weights_name
 from rl.settings import RECIPES
 from rl.training.candidates import Choice, best_of_run
 from rl.training.run_folder import read_rows, read_run
+from studies.campaign.shards import write_durably
 
 VALIDATION_SEED = 0
 """Study seed of the one flight over the validation tiles, as of the cards of shipped weights."""
@@ -205,12 +207,12 @@ def _check_distinct(scores: Iterable[AgentScore]) -> None:
 
 
 def write_scores(path: Path, scores: Sequence[AgentScore]) -> None:
-    """Write scores as CSV, a line per agent."""
-    names = [field.name for field in fields(AgentScore)]
-    with path.open("w", newline="") as stream:
-        writer = csv.DictWriter(stream, names, lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(asdict(score) for score in scores)
+    """Write scores as CSV, a line per agent; a crash leaves the file as it was."""
+    text = StringIO(newline="")
+    writer = csv.DictWriter(text, [field.name for field in fields(AgentScore)], lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(asdict(score) for score in scores)
+    write_durably(path, text.getvalue().encode())
 
 
 def read_scores(path: Path) -> list[AgentScore]:

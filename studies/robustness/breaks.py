@@ -11,8 +11,8 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from hda.flight.episode_row import EpisodeRow
 from studies.campaign.points import Rows
-from studies.campaign.rows import EpisodeRow
 from studies.statistics.paired import paired_ratio_interval
 from studies.statistics.ratios import Interval
 

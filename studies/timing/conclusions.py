@@ -6,6 +6,7 @@ disturb it little.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -15,6 +16,9 @@ from studies.speed_ratios import FREE_TO_FIXED_LIMIT
 from studies.timing.gfold_peer import PEER_METHOD
 from studies.timing.measures import Call, Summary
 from studies.timing.methods import FATROP_METHOD, IPOPT_METHOD, OWN_METHOD, PEER_NODES, Method
+from studies.timing.openscvx_peer import FIRST_ORDER_HOLD, OPENSCVX_METHOD
+from studies.timing.openscvx_worker import WEIGHTS
+from studies.timing.qoco_peer import CLARABEL_METHOD, QOCO_METHOD
 
 PEER_BAR = 100.0
 """Least factor by which solve_pdg should beat gfold's free-time solve at 30 nodes."""
@@ -78,7 +82,71 @@ def conclude(methods: Sequence[Method], calls: Sequence[Call], summaries: Sequen
             "steps are t/n on n nodes, so a flight asked to last t lasts t (n - 1)/n; here it is asked for "
             "the longer time and judged on the steps it flew."
         )
+    by_label = {summary.method: summary for summary in summaries}
+    words += _qoco_against_clarabel(starts, calls, by_label, methods)
+    words += _openscvx(starts, calls, by_label, methods)
     return words
+
+
+def _qoco_against_clarabel(
+    starts: Sequence[Call], calls: Sequence[Call], summaries: dict[str, Summary], methods: Sequence[Method]
+) -> list[str]:
+    """The two conic solvers on the same programmes: time on the drawn starts, plans on all cases."""
+    words = []
+    for free in (True, False):
+        labels = {
+            m.name: m.label for m in methods if m.free is free and m.name in (QOCO_METHOD, CLARABEL_METHOD)
+        }
+        if len(labels) < 2:
+            continue
+        qoco, clarabel = labels[QOCO_METHOD], labels[CLARABEL_METHOD]
+        found = compare_methods(starts, qoco, clarabel)
+        theirs, ours = summaries[qoco], summaries[clarabel]
+        endings = Counter(c.status.value for c in calls if c.method == qoco and not c.feasible)
+        told = ", ".join(f"{count} x {ending}" for ending, count in endings.most_common()) or "none"
+        words.append(
+            f"Drawn starts, the same cone programmes, {'free' if free else 'fixed'} time: QOCO takes "
+            f"{found.ratio:.2f} times as long as Clarabel ({found.paired:.2f} case by case). Of "
+            f"{ours.feasible} feasible calls it solves {theirs.solved} within every limit, Clarabel "
+            f"{ours.solved}; their plans are at most {1e3 * _apart(calls, qoco, clarabel):.2g} g apart. "
+            f"Infeasible ones end for QOCO, which certifies none, as: {told} (a tank that does not suffice "
+            f"is seen in a flight, without the solver's word); Clarabel refuses {ours.refused} of "
+            f"{ours.infeasible}."
+        )
+    return words or ["QOCO is not installed (extra `peers`): no comparison with it was made."]
+
+
+def _apart(calls: Sequence[Call], first: str, second: str) -> float:
+    """[kg] greatest difference of what two methods burn, over cases where both keep every limit."""
+    burnt = [{c.case: c.regret for c in calls if c.method == m and c.keeps_limits} for m in (first, second)]
+    return max((abs(burnt[0][case] - burnt[1][case]) for case in burnt[0].keys() & burnt[1]), default=np.nan)
+
+
+def _openscvx(
+    starts: Sequence[Call], calls: Sequence[Call], summaries: dict[str, Summary], methods: Sequence[Method]
+) -> list[str]:
+    """OpenSCvx beside solve_pdg on the nearest mesh; its plans as it states them, and as they fly."""
+    words = []
+    for method in (m for m in methods if m.name == OPENSCVX_METHOD):
+        near = min(
+            (m for m in methods if m.name == OWN_METHOD and m.free is method.free),
+            key=lambda m: abs(m.nodes - method.nodes),
+        )
+        found, summary = compare_methods(starts, method.label, near.label), summaries[method.label]
+        ended = [c for c in calls if c.method == method.label and c.feasible and c.status.has_flight]
+        regret = np.median([c.regret for c in ended]) if ended else np.nan
+        miss = np.median([c.miss for c in ended]) if ended else np.nan
+        words.append(
+            f"Drawn starts: OpenSCvx, {'free' if method.free else 'fixed'} time, takes {found.ratio:.0f} "
+            f"times as long as '{near.label}' ({found.paired:.0f} case by case), compiling left out. It "
+            f"calls {len(ended)} of {summary.feasible} feasible calls converged, {1e3 * regret:.1f} g from "
+            f"the tight optimum by its own masses (median). Flown by the thrust at its nodes, "
+            f"{summary.solved} keep every limit, and they end {miss:.2f} m from where they say (median)."
+        )
+    if not words:
+        return ["OpenSCvx is not installed (extra `peers`): no comparison with it was made."]
+    weights = ", ".join(f"{name} {value:g}" for name, value in WEIGHTS.items())
+    return [*words, f"OpenSCvx's weights: {weights}; its own tuner moves them. {FIRST_ORDER_HOLD}"]
 
 
 def _fatrop_against_ipopt(

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import math
+import platform
 from collections.abc import Sequence
 from dataclasses import dataclass
-from time import perf_counter, process_time
+from functools import partial
+from pathlib import Path
+from time import perf_counter
 
 import numpy as np
 from rich.progress import track
 
 from guidance import PlanStatus
+from studies.campaign.journal import Journal
 from studies.timing.methods import Case, Method
 
 
@@ -28,6 +33,7 @@ class Call:
         regret: [kg] propellant beyond the tight optimum; nan without a flight.
         solves: fixed-time optimisations; 0 where the method does not count them.
         keeps_limits: whether the flown plan respects every limit; False without a flight.
+        miss: [m] between where the plan, flown, lands and where it says; nan without a flight.
     """
 
     method: str
@@ -40,6 +46,7 @@ class Call:
     regret: float
     solves: int
     keeps_limits: bool
+    miss: float = math.nan
 
 
 @dataclass(frozen=True)
@@ -87,9 +94,9 @@ def measure_call(method: Method, case: Case) -> Call:
     """Plan once against both clocks, then check the plan."""
     if method.prepare is not None:
         method.prepare()
-    start, started = perf_counter(), process_time()
+    start, started = perf_counter(), method.clock()
     plan = method.run(case)
-    processor, seconds = process_time() - started, perf_counter() - start
+    processor, seconds = method.clock() - started, perf_counter() - start
     return Call(
         method.label,
         case.name,
@@ -101,20 +108,41 @@ def measure_call(method: Method, case: Case) -> Call:
         plan.propellant - case.propellant,
         plan.solves,
         plan.keeps_limits,
+        plan.residuals.landing_position if plan.nodes else math.nan,
     )
 
 
-def measure_calls(methods: Sequence[Method], cases: Sequence[Case], repeats: int) -> list[Call]:
-    """Every method on every case in turn; a call that compiles for a new set of limits is not counted."""
+def measure_calls(
+    methods: Sequence[Method], cases: Sequence[Case], repeats: int, journal: Journal[Call]
+) -> list[Call]:
+    """Every method on every case in turn; a call that compiles for a new set of limits is not counted.
+
+    Calls that stand in the journal are not made again, and each goes there at once.
+    """
     calls: list[Call] = []
     warm: set[tuple[bool, ...]] = set()
     for case in track(cases, "cases", transient=True):
-        if case.limits not in warm:
+        turns = [(turn, method) for turn in range(repeats) for method in methods]
+        kept = [journal.find((case.name, method.label, turn)) for turn, method in turns]
+        if None in kept and case.limits not in warm:
             warm.add(case.limits)
             for method in methods:
                 method.run(case)
-        calls += [measure_call(method, case) for _ in range(repeats) for method in methods]
+        calls += [
+            journal.finish((case.name, method.label, turn), partial(measure_call, method, case))
+            for turn, method in turns
+        ]
     return calls
+
+
+def name_processor() -> str:
+    """What the times were measured on, as far as the system tells."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:  # not Linux
+        lines = []
+    models = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return models[0] if models else platform.processor()
 
 
 def summarize_calls(label: str, calls: Sequence[Call]) -> Summary:

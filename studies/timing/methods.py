@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from time import process_time
 
 import numpy as np
 
@@ -17,8 +18,16 @@ from guidance.reference.casadi_planner import plan_casadi
 from guidance.reference.nonlinear_program import NonlinearSolver, fatrop_present
 from hda.task.scenario import sample_scenario
 from studies.timing.gfold_peer import PEER_METHOD, gfold_present, plan_gfold
+from studies.timing.openscvx_peer import OPENSCVX_METHOD, OpenscvxPlanner
+from studies.timing.qoco_peer import (
+    CLARABEL_METHOD,
+    QOCO_METHOD,
+    QocoPlanner,
+    plan_clarabel,
+    qoco_present,
+)
 
-CONVEX, CASADI, CVXPY = METHODS
+AUTO, _, CONVEX, CASADI, CVXPY = METHODS
 
 PEER_NODES = 30
 _TIGHT_NODES = 201
@@ -62,7 +71,7 @@ class Case:
 
 
 def ask(
-    problem: LandingProblem, nodes: int, time_of_flight: float | None, method: PlanningMethod = CONVEX
+    problem: LandingProblem, nodes: int, time_of_flight: float | None, method: PlanningMethod = AUTO
 ) -> Plan:
     """Call `solve_pdg` on a problem; a plan without a flight is returned, not raised."""
     try:
@@ -137,6 +146,7 @@ class Method:
         free: whether it searches the time of flight.
         plan: (problem, nodes, time of flight or None) -> Plan.
         prepare: what must be undone before each call, outside the clock; None for nothing.
+        clock: [s] processor time of what solves; of this process by default.
     """
 
     name: str
@@ -144,6 +154,7 @@ class Method:
     free: bool
     plan: Callable[[LandingProblem, int, float | None], Plan]
     prepare: Callable[[], None] | None = None
+    clock: Callable[[], float] = process_time
 
     @property
     def label(self) -> str:
@@ -174,8 +185,12 @@ def _forget_cvxpy_model() -> None:
     cvxpy_planner.forget_models()
 
 
-def timed_methods() -> list[Method]:
-    """Every method that is installed; the first of them is solve_pdg as users call it."""
+def timed_methods(openscvx: OpenscvxPlanner | None = None) -> list[Method]:
+    """Every method that is installed; the first of them is solve_pdg as users call it.
+
+    Args:
+        openscvx: who asks that package; None where it is not installed.
+    """
     cvxpy, casadi, both = _by_method(CVXPY), _by_method(CASADI), (True, False)
     methods = [Method(OWN_METHOD, nodes, free, ask) for nodes in (DEFAULT_NODES, 31) for free in both]
     methods += [Method(DPP_METHOD, DEFAULT_NODES, free, cvxpy) for free in both]
@@ -188,4 +203,13 @@ def timed_methods() -> list[Method]:
     if gfold_present():
         methods += [Method(PEER_METHOD, PEER_NODES, free, plan_gfold) for free in both]
         methods.append(Method(PEER_METHOD, DEFAULT_NODES, True, plan_gfold))
+    if qoco_present():
+        qoco = QocoPlanner()
+        for free in both:
+            methods.append(Method(CLARABEL_METHOD, DEFAULT_NODES, free, plan_clarabel))
+            methods.append(Method(QOCO_METHOD, DEFAULT_NODES, free, qoco.plan))
+    if openscvx is not None:
+        methods += [
+            Method(OPENSCVX_METHOD, PEER_NODES, free, openscvx.plan, clock=openscvx.clock) for free in both
+        ]
     return methods

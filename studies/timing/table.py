@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from studies.columns import Column, Output
+from studies.timing.answer_times import QUANTILES, AnswerTime
 from studies.timing.measures import Call, Summary
 
 _MS = 1e3  # s -> ms
@@ -37,6 +38,22 @@ SUMMARY_COLUMNS: tuple[Column[Summary], ...] = (
 )
 """The methods: timing.csv, timing.md and the console read this list."""
 
+
+def _quantile_column(number: int) -> Column[AnswerTime]:
+    percent = f"{100.0 * QUANTILES[number]:g}"
+    key = f"cpu_ms_p{percent.replace('.', '_')}"
+    return Column(key, f"{percent} %", lambda row: _MS * row.quantiles[number], digits=2, unit="ms")
+
+
+ANSWER_COLUMNS: tuple[Column[AnswerTime], ...] = (
+    Column("starts", "starts", lambda row: row.starts, words=True),
+    Column("answer", "answer", lambda row: row.answer, words=True),
+    Column("count", "count", lambda row: row.count),
+    *(_quantile_column(number) for number in range(len(QUANTILES))),
+    Column("cpu_ms_max", "max", lambda row: _MS * row.greatest, digits=2, unit="ms"),
+)
+"""How long answers take: answers.csv, answers.md and the console read this list."""
+
 CALL_COLUMNS: tuple[Column[Call], ...] = (
     Column("method", "method", lambda call: call.method),
     Column("case", "case", lambda call: call.case),
@@ -46,5 +63,6 @@ CALL_COLUMNS: tuple[Column[Call], ...] = (
     Column("regret_g", "regret", lambda call: _G * call.regret),
     Column("solves", "solves", lambda call: call.solves),
     Column("keeps_limits", "keeps limits", lambda call: call.keeps_limits),
+    Column("miss_m", "miss", lambda call: call.miss),
 )
 """Every call, as calls.csv has it."""

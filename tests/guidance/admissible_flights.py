@@ -19,11 +19,13 @@ class AdmissibleFlight:
         problem: from the start to the end, with the velocity there.
         time: [s] flown.
         spent: [m/s] velocity change.
+        slope: [rad] greatest angle from the vertical, seen from the end.
     """
 
     problem: LandingProblem
     time: float
     spent: float
+    slope: float
 
 
 def random_lander(rng: np.random.Generator) -> Lander:
@@ -42,7 +44,7 @@ def _directions(lander: Lander, count: int, rng: np.random.Generator) -> np.ndar
 
 
 def random_flight(rng: np.random.Generator) -> AdmissibleFlight:
-    """A few arcs of steady thrust, full, least or between, on a random world; it ends below the start."""
+    """A few arcs of steady thrust, full, least or between, on a random world; it ends at its lowest place."""
     while True:
         flight = _flight(rng)
         if flight is not None:
@@ -59,7 +61,7 @@ def _flight(rng: np.random.Generator) -> AdmissibleFlight | None:
     affordable = 0.9 * (mass - lander.dry_mass) * lander.exhaust_velocity / max(thrusts @ durations, 1e-9)
     durations *= min(1.0, affordable)
     position, velocity = np.zeros(3), rng.normal([0.0, 0.0, -30.0], 30.0)
-    start_velocity = velocity.copy()
+    start_velocity, path = velocity.copy(), [position]
     for thrust, duration, direction in zip(thrusts, durations, _directions(lander, arcs, rng), strict=True):
         flow = thrust / lander.exhaust_velocity
         step = duration / _STEPS
@@ -71,9 +73,12 @@ def _flight(rng: np.random.Generator) -> AdmissibleFlight | None:
             after = velocity + gained[1] * direction + step * gravity
             position = position + step / 6.0 * (velocity + 4.0 * middle + after)
             velocity, mass = after, mass - flow * step
-    if position[2] > 0.0 or mass == start_mass:  # a landing problem's target does not lie above its start
+            path.append(position)
+    seen = np.array(path) - position
+    if seen[:, 2].min() < 0.0 or mass == start_mass:  # it would have flown below a landing problem's target
         return None
+    slope = float(np.arctan2(np.hypot(seen[:-1, 0], seen[:-1, 1]), seen[:-1, 2]).max())
     start = State(np.zeros(3), start_velocity, start_mass)
     problem = LandingProblem(start, position, lander, gravity, target_velocity=velocity)
     spent = lander.exhaust_velocity * math.log(start_mass / mass)
-    return AdmissibleFlight(problem, float(durations.sum()), spent)
+    return AdmissibleFlight(problem, float(durations.sum()), spent, slope)

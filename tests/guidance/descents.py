@@ -7,10 +7,13 @@ import numpy as np
 
 from guidance import PAPER_LANDER, Lander, State
 from guidance.descent.problem import LandingProblem
+from guidance.pdg.solve import METHODS, PlanningMethod
 
 ROOT = Path(__file__).parents[2]
 TARGET = np.array([0.0, 0.0, 50.0])
 GRAVITY = np.array([0.0, 0.0, -1.62])
+COMPLETE: tuple[PlanningMethod, ...] = tuple(method for method in METHODS if method != "indirect")
+"""Methods that answer every problem; the indirect one leaves what has limits that bind to others."""
 CASES = json.loads((ROOT / "studies" / "timing" / "cases" / "pdg_cases.json").read_text())["cases"]
 FEASIBLE = [case for case in CASES if case["feasible"]]
 IMPOSSIBLE = [case for case in CASES if not case["feasible"]]

@@ -55,3 +55,18 @@ def test_every_public_name_is_found_and_others_are_not():
     assert set(dir(guidance)) == set(guidance.__all__)
     with pytest.raises(AttributeError, match=r"'guidance' has no attribute 'lunar'"):
         _ = guidance.lunar  # type: ignore[attr-defined]
+
+
+def test_no_first_call_waits_for_what_its_import_could_load():
+    """Nothing is imported or compiled by the first plan of a process."""
+    use = """
+from guidance import solve_pdg
+from guidance.flight_time.primer_equations import solve_primer
+ready, loaded = set(sys.modules), len(solve_primer.signatures)
+solve_pdg((250, 100, 950, -8, -4, -30, 1200), (0, 0, 50))
+assert len(solve_primer.signatures) == loaded == 1
+sys.modules.update(dict.fromkeys(f"late {name}" for name in set(sys.modules) - ready))
+"""
+    _, modules = import_guidance(use)
+    assert "guidance.pdg.prepared" in modules
+    assert not {name for name in modules if name.startswith("late ")}

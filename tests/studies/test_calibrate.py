@@ -19,7 +19,7 @@ from studies.calibrate import (
     interpolate_crossing,
     with_control_period,
 )
-from studies.campaign.study_folder import FolderError
+from studies.campaign.claimed_folder import FolderError
 from studies.ground_statistics import measure_ground
 
 

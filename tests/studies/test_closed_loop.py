@@ -14,7 +14,7 @@ from hda.flight.episode import fly
 from hda.registry import make_policy
 from hda.task.scenario import sample_scenario
 from studies.campaign import monte_carlo
-from studies.campaign.study_folder import FolderError
+from studies.campaign.claimed_folder import FolderError
 from studies.closed_loop.command import ClosedLoop, plan_study, run_closed_loop
 from studies.closed_loop.laws import law_name, law_path
 
@@ -95,6 +95,10 @@ def test_rows_table_and_provenance_stand_in_the_folder(
     monkeypatch.setattr(monte_carlo, "fly_chunk", refuse)
     run_closed_loop(options(tmp_path, resume=True))
     assert (tmp_path / "table.csv").read_bytes() == before
+    with pytest.raises(ValueError, match="exclude each other"):
+        run_closed_loop(options(tmp_path, resume=True, overwrite=True))
+    with pytest.raises(AssertionError, match="flown again"):
+        run_closed_loop(options(tmp_path, overwrite=True))
 
 
 def test_options_are_checked() -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 from hypothesis import given
 from hypothesis import strategies as st
 
-from studies.campaign.rows import MEASURES
+from hda.flight.episode_row import MEASURES
 from studies.campaign.score import MEASURE_COLUMNS, Score
 from studies.columns import Column, Output, console_table, markdown_lines, standing_in, write_csv
 from studies.compare.differences import DIFFERENCE_COLUMNS

@@ -3,6 +3,7 @@
 import csv
 import json
 import math
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,17 +16,21 @@ from hda.registry import make_policy
 from hda.task.presets import PRESETS, Preset
 from hda.task.rules import Range
 from hda.task.scenario import sample_scenario
+from studies.campaign.claimed_folder import FolderError
 from studies.campaign.monte_carlo import Study
 from studies.compare.command import Comparison, compare
+from studies.failures import command
 from studies.failures.causes import (
     Cause,
+    Failure,
     count_safe_cells,
     explain_failure,
     find_remedies,
     last_change,
     read_pixels,
 )
-from studies.failures.command import Failures, describe_failure, read_study, show_failures
+from studies.failures.command import Failures, read_study, show_failures
+from studies.failures.table import describe_failure
 
 HARD = PRESETS["hard"]
 
@@ -132,6 +137,83 @@ def test_every_failed_episode_is_shown(flown: Path) -> None:
     assert f"{len(failed)} failed, the first 2 shown" in text
     assert len((folder / "failures.csv").read_text().splitlines()) == 3
     assert json.loads((folder / "provenance.json").read_text())["options"]["most"] == 2
+
+
+@pytest.mark.parametrize("stop", [0, 1, 3])
+def test_a_stopped_run_goes_on_where_it_was(
+    flown: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, stop: int
+) -> None:
+    """Stopped in a later failure, resumed, asked for more: the rows of a whole run, none explained twice."""
+    whole = show_failures(Failures(flown, most=4, figures=False, out=tmp_path / "whole"))["single-divert"]
+    done: list[int] = []
+
+    def explain(record: EpisodeRecord) -> Failure:
+        if len(done) == stop:
+            raise KeyboardInterrupt
+        done.append(record.scenario.streams.episode)
+        return explain_failure(record)
+
+    options = Failures(flown, most=4, figures=False, out=tmp_path / "parts")
+    monkeypatch.setattr(command, "explain_failure", explain)
+    with pytest.raises(KeyboardInterrupt):
+        show_failures(options)
+    monkeypatch.undo()
+    with pytest.raises(FolderError, match=r"--resume.*--overwrite"):
+        show_failures(options)
+    resumed: list[int] = []
+    monkeypatch.setattr(
+        command,
+        "explain_failure",
+        lambda record: resumed.append(record.scenario.streams.episode) or explain_failure(record),
+    )
+    rows = show_failures(replace(options, resume=True))["single-divert"]
+    assert done + resumed == [failure.episode for failure in whole]
+    assert len(done) == stop
+    assert [repr(row) for row in rows] == [repr(row) for row in whole]  # nan is not nan
+    for name in ("failures.csv", "failures.md"):
+        assert (tmp_path / "parts" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
+    sessions = json.loads((tmp_path / "parts" / "provenance.json").read_text())["work"]["sessions"]
+    assert [entry["items"] for entry in sessions] == [count for count in (stop, len(whole) - stop) if count]
+
+
+def test_only_a_missing_picture_is_drawn_again(
+    flown: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    options = Failures(flown, most=3, out=tmp_path)
+    failures = show_failures(options)["single-divert"]
+    pictures = {
+        failure.episode: tmp_path / f"single-divert-{failure.episode:06d}.png" for failure in failures
+    }
+    before = {episode: path.read_bytes() for episode, path in pictures.items()}
+    lost = failures[1].episode
+    pictures[lost].unlink()
+    again: list[int] = []
+    monkeypatch.setattr(
+        command,
+        "fly",
+        lambda pilot, scenario: again.append(scenario.streams.episode) or fly(pilot, scenario),
+    )
+    monkeypatch.setattr(command, "explain_failure", None)  # it is not asked
+    show_failures(replace(options, resume=True))
+    assert again == [lost]
+    assert {episode: path.read_bytes() for episode, path in pictures.items()} == before
+    monkeypatch.undo()
+    (tmp_path / "mine.png").write_text("mine")
+    show_failures(replace(options, most=1, overwrite=True))
+    assert sorted(path.name for path in tmp_path.glob("*.png")) == [
+        "mine.png",
+        pictures[failures[0].episode].name,
+    ]
+
+
+def test_failures_of_another_study_are_not_mixed_in(flown: Path, tmp_path: Path) -> None:
+    show_failures(Failures(flown, most=1, figures=False, out=tmp_path / "failures"))
+    other = tmp_path / "other"
+    shutil.copytree(flown / "shards", other / "shards")
+    held = other / "shards" / "study.json"
+    held.write_text(held.read_text().replace('"study_seed": 0', '"study_seed": 1'))
+    with pytest.raises(FolderError, match=r"options\.study_seed was 0, is 1"):
+        show_failures(Failures(other, most=1, figures=False, out=tmp_path / "failures", resume=True))
 
 
 def test_a_wrong_folder_or_policy_is_named(flown: Path, tmp_path: Path) -> None:

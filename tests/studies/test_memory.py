@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import os
 import re
 import shutil
 from dataclasses import replace
@@ -118,6 +119,20 @@ def test_scores_on_disk_come_back(tmp_path):
     (tmp_path / "scores.csv").write_text("agent,preset\ntd3,paper\n")
     with pytest.raises(ValueError, match="damaged"):
         read_scores(tmp_path / "scores.csv")
+
+
+def test_scores_stay_where_new_ones_cannot_be_written(tmp_path, monkeypatch):
+    kept = group("td3", "paper", WITHOUT)
+    write_scores(tmp_path / "scores.csv", kept)
+
+    def stop(_descriptor):
+        raise OSError("the disk is full")
+
+    monkeypatch.setattr(os, "fsync", stop)
+    with pytest.raises(OSError, match="disk is full"):
+        write_scores(tmp_path / "scores.csv", [])
+    assert read_scores(tmp_path / "scores.csv") == kept
+    assert [path.name for path in tmp_path.iterdir()] == ["scores.csv"]
 
 
 def test_cards_give_a_score_per_seed(tmp_path):

@@ -16,7 +16,7 @@ import hda
 from hda import registry
 from hda.registry import ENTRY_POINT_GROUP, PolicyRegistry, policy_entry
 from hda.task.presets import PRESETS
-from studies.campaign.study_folder import FolderError
+from studies.campaign.claimed_folder import FolderError
 from studies.compare.command import Comparison, compare, plan_study
 from studies.contract import ContractError, check_contract
 from studies.statistics.ratios import least_passing

@@ -11,9 +11,9 @@ import pytest
 from matplotlib.text import Annotation
 
 from guidance import PlanStatus
+from hda.flight.episode_row import MEASURES, EpisodeRow
 from hda.task.presets import PRESETS
 from studies.campaign.monte_carlo import Study
-from studies.campaign.rows import MEASURES, EpisodeRow
 from studies.campaign.score import Score
 from studies.compare.figures import draw_histograms
 from studies.compare.histograms import BINS, MeasureHistograms

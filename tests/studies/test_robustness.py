@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
+from hda.flight.episode_row import EpisodeRow
 from hda.task.presets import PRESETS, Preset
+from studies.campaign.claimed_folder import FolderError
 from studies.campaign.points import Rows
-from studies.campaign.rows import EpisodeRow
-from studies.campaign.study_folder import FolderError
 from studies.robustness.breaks import find_breaks
 from studies.robustness.command import Robustness, plan_points, run_robustness
 from studies.robustness.factors import FACTORS, Factor

@@ -26,7 +26,7 @@ def test_lines_are_kept_and_gone_on_with(tmp_path: Path, monkeypatch: pytest.Mon
 
     def note(study) -> Measurement:
         measured.append((study.episodes, study.workers, study.overwrite))
-        study.out.mkdir()
+        study.out.mkdir(exist_ok=True)
         return Measurement(study.episodes, study.workers, 2.0, 1.0, 10**8, 10**6)
 
     monkeypatch.setattr(scale, "measure_study", note)
@@ -37,6 +37,10 @@ def test_lines_are_kept_and_gone_on_with(tmp_path: Path, monkeypatch: pytest.Mon
         rows = list(csv.DictReader(stream))
     assert [row["episodes"] for row in rows] == ["3", "4"]
     assert [rows[1][name] for name in ("episodes_per_s", "memory_mb")] == ["2", "100"]
+
+    lines = measure_scale(replace(options, overwrite=True))
+    assert measured == [(4, 1, True), (3, 1, True)]
+    assert lines[0].memory == 10**8
 
     held = folder / "shards" / "study.json"
     held.write_text(held.read_text().replace('"study_seed": 0', '"study_seed": 1'))

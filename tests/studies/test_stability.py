@@ -2,6 +2,7 @@
 
 import csv
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,7 +14,9 @@ from guidance import MOON_GRAVITY, Lander, State, zem_zev_acceleration
 from hda.flight.vehicle import ControlPeriods, FlightErrors, FlightStatus, fly_interval
 from hda.policy import Decision, DecisionStatus, ZemZevCommand
 from hda.task.presets import PRESETS
-from studies.stability.command import Stability, study_stability
+from studies.campaign.claimed_folder import FolderError
+from studies.stability import command
+from studies.stability.command import Stability, study_pair, study_stability
 from studies.stability.held_loop import (
     Gains,
     closed_margins,
@@ -275,6 +278,40 @@ def test_study_writes_its_folder(tmp_path) -> None:
     text = (tmp_path / "conclusions.txt").read_text()
     assert "the speed vanishes at touchdown for 4 of 4 pairs" in text
     assert (tmp_path / "stability.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("stop", [0, 3])
+def test_a_stopped_study_goes_on_where_it_was(tmp_path, monkeypatch, stop: int) -> None:
+    """Equal bytes, and no pair of gains worked out twice."""
+    whole = Stability(gain_points=2, figures=False, out=tmp_path / "whole")
+    study_stability(whole)
+    options, done = replace(whole, out=tmp_path / "parts"), []
+
+    def study(gains: Gains, *rest) -> command.PairRows:
+        if len(done) == stop and not options.resume:
+            raise KeyboardInterrupt
+        done.append(gains)
+        return study_pair(gains, *rest)
+
+    monkeypatch.setattr(command, "study_pair", study)
+    with pytest.raises(KeyboardInterrupt):
+        study_stability(options)
+    assert done == gain_box(2)[:stop]
+    with pytest.raises(FolderError, match=r"--resume.*--overwrite"):
+        study_stability(options)
+    options = replace(options, resume=True)
+    study_stability(options)
+    assert done == gain_box(2)
+    for name in ("gains.csv", "gains.md", "margins.csv", "conclusions.txt"):
+        assert (tmp_path / "parts" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
+    for changes, named in (
+        ({"preset": "hard"}, r"options\.preset was .paper., is .hard."),
+        ({"phase_margin": 20.0}, r"options\.phase_margin was 30\.0, is 20\.0"),
+    ):
+        with pytest.raises(FolderError, match=named):
+            study_stability(replace(options, **changes))
+    study_stability(replace(options, resume=False, overwrite=True, phase_margin=20.0))
+    assert len(done) == 8
 
 
 @pytest.mark.parametrize("field", [{"gain_points": 1}, {"phase_margin": 60.0}, {"gain_margin": 0.5}])

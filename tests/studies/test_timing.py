@@ -5,13 +5,16 @@ import importlib.util
 import json
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from guidance import PAPER_LANDER, Lander, Plan, PlanStatus, State, solve_pdg
 from guidance.descent.problem import LandingProblem
+from studies.campaign.claimed_folder import FolderError
 from studies.timing import command as timing
+from studies.timing import measures
 from studies.timing.command import Timing, study_timing
 from studies.timing.conclusions import compare_methods, conclude
 from studies.timing.gfold_peer import FREE_TIME_SOLVES, PEER_METHOD, plan_gfold
@@ -28,6 +31,7 @@ from studies.timing.methods import (
     OWN_METHOD,
     PEER_NODES,
     REBUILT_METHOD,
+    Case,
     Method,
     make_case,
     reference_cases,
@@ -203,11 +207,11 @@ def test_study_writes_its_folder(tmp_path, monkeypatch, capsys, present: bool) -
         monkeypatch.setattr(importlib.util, "find_spec", lambda _name: None)
     chosen = [m for m in timed_methods() if m.name in (OWN_METHOD, PEER_METHOD) and m.nodes <= 31]
     assert [m.name for m in chosen].count(PEER_METHOD) == (2 if present else 0)
-    monkeypatch.setattr(timing, "timed_methods", lambda: chosen)
+    monkeypatch.setattr(timing, "timed_methods", lambda _openscvx=None: chosen)
     cases = tmp_path / "cases.json"
     listed = json.loads(timing._CASES.read_text())["cases"]
     cases.write_text(json.dumps({"cases": [listed[0], listed[-1]]}))
-    summaries = study_timing(Timing(starts=1, cases=cases, out=tmp_path / "out"))
+    summaries = study_timing(Timing(starts=1, answers=0, cases=cases, out=tmp_path / "out"))
     assert [s.method for s in summaries] == [m.label for m in chosen]
     ours = summaries[0]
     assert (ours.feasible, ours.solved, ours.infeasible, ours.refused) == (2, 2, 1, 1)
@@ -220,8 +224,79 @@ def test_study_writes_its_folder(tmp_path, monkeypatch, capsys, present: bool) -
     assert json.loads((tmp_path / "out" / "provenance.json").read_text())["options"]["starts"] == 1
     assert (tmp_path / "out" / "timing.md").read_text().count("\n") == 2 + len(chosen)
     text = (tmp_path / "out" / "conclusions.txt").read_text()
-    assert ("not installed" in text) is not present
-    assert ("without it" in capsys.readouterr().out) is not present
+    assert ("gfold is not installed" in text) is not present
+    assert ("gfold is not installed: the study runs without it" in capsys.readouterr().out) is not present
+
+
+@pytest.fixture
+def quick(tmp_path, monkeypatch) -> Timing:
+    """Two reference cases, one of them infeasible, and a start, by solve_pdg at 31 nodes alone."""
+    chosen = [m for m in timed_methods() if m.name == OWN_METHOD and m.nodes == 31]
+    monkeypatch.setattr(timing, "timed_methods", lambda _openscvx=None: chosen)
+    cases = tmp_path / "cases.json"
+    listed = json.loads(timing._CASES.read_text())["cases"]
+    cases.write_text(json.dumps({"cases": [listed[0], listed[-1]]}))
+    return Timing(starts=1, answers=0, cases=cases, figures=False, out=tmp_path / "out")
+
+
+@pytest.mark.parametrize("stop", [0, 3, 5])
+def test_a_stopped_study_goes_on_where_it_was(quick: Timing, monkeypatch, stop: int) -> None:
+    """A call that was measured is not measured again, and its times stay."""
+    made: list[Call] = []
+
+    def measure(method: Method, case: Case) -> Call:
+        if len(made) == stop and stop < 6:
+            raise KeyboardInterrupt
+        made.append(measure_call(method, case))
+        return made[-1]
+
+    monkeypatch.setattr(measures, "measure_call", measure)
+    with pytest.raises(KeyboardInterrupt):
+        study_timing(quick)
+    before, stop = stop, 6
+    with pytest.raises(FolderError, match=r"--resume.*--overwrite"):
+        study_timing(quick)
+    summaries = study_timing(replace(quick, resume=True))
+    assert len(made) == 6
+    labels = [method.label for method in timing.timed_methods()]
+    assert [repr(s) for s in summaries] == [repr(summarize_calls(label, made)) for label in labels]
+    with (quick.out / "calls.csv").open() as stream:
+        rows = list(csv.DictReader(stream))
+    assert [(r["method"], r["case"]) for r in rows] == [(one.method, one.case) for one in made]
+    sessions = json.loads((quick.out / "provenance.json").read_text())["work"]["sessions"]
+    assert [entry["items"] for entry in sessions] == [count for count in (before, 6 - before) if count]
+    more = study_timing(replace(quick, starts=2, resume=True))
+    assert len(made) == 8
+    assert more[0].feasible == 3
+
+    def refuse(*_: object) -> Plan:
+        raise AssertionError("asked, and be it to warm up")
+
+    idle = [replace(method, plan=refuse) for method in timing.timed_methods()]
+    monkeypatch.setattr(timing, "timed_methods", lambda _openscvx: idle)
+    assert study_timing(replace(quick, starts=2, resume=True))[0] == more[0]
+
+
+def test_calls_of_another_study_are_not_mixed_in(quick: Timing, monkeypatch) -> None:
+    study_timing(quick)
+    resumed = replace(quick, resume=True)
+    with pytest.raises(FolderError, match=r"options\.preset was .paper., is .hard."):
+        study_timing(replace(resumed, preset="hard"))
+    monkeypatch.setattr(timing, "name_processor", lambda: "an abacus")
+    with pytest.raises(FolderError, match=r"options\.processor was .*, is .an abacus."):
+        study_timing(resumed)
+    monkeypatch.undo()
+    listed = json.loads(quick.cases.read_text())["cases"]
+    quick.cases.write_text(json.dumps({"cases": [listed[0], listed[0]]}))
+    with pytest.raises(FolderError, match=r"options\.cases"):
+        study_timing(resumed)
+    with pytest.raises(ValueError, match="2 of them have the name"):
+        study_timing(replace(quick, overwrite=True))
+
+
+def test_the_processor_has_a_name() -> None:
+    if Path("/proc/cpuinfo").exists():
+        assert measures.name_processor() in Path("/proc/cpuinfo").read_text()
 
 
 def test_options_are_checked() -> None:

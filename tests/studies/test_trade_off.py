@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 import hda
 from hda import registry
 from hda.flight.episode import fly
+from hda.flight.episode_row import MEASURES
 from hda.policies.hazard_aware import HazardAwareSite
 from hda.policies.site_price import HazardAwareWeights
 from hda.registry import make_policy
 from hda.task.scenario import sample_scenario
-from studies.campaign.rows import MEASURES
 from studies.campaign.score import Score
 from studies.statistics.ratios import Interval
 from studies.trade_off.command import TradeOff, find_front, plan_points, run_trade_off

@@ -10,14 +10,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from hda.flight.episode_row import EpisodeRow
 from hda.policies.surroundings import safe_share_table
 from rl.inference.artefacts import ArtefactError, card_digest, load_artefact, save_artefact
 from rl.policies.actor import load_actor
 from rl.training.run_folder import read_rows, read_run
+from studies.campaign.claimed_folder import Existing, FolderError
 from studies.campaign.monte_carlo import Chunk, Study, chunk_bounds
-from studies.campaign.rows import EpisodeRow
 from studies.campaign.shards import ShardError, read_shard, shard_path
-from studies.campaign.study_folder import Existing, FolderError, open_study_folder
+from studies.campaign.study_folder import open_study_folder
 
 JSON = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=8),

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hda.ground.tile import Tile
+from hda.policies.surroundings import squared_distance
 from hda.site_selection import Site
 from hda.task.observation import Observation, ScenarioView
 from hda.task.scenario import Scenario
@@ -20,11 +21,9 @@ def safe_clearance(tile: Tile) -> NDArray[np.float32]:
 
     Zero or less on unsafe cells; the outside of the map is unsafe.
     """
-    from scipy.ndimage import distance_transform_edt
-
-    padded = np.pad(tile.deterministic, 1, constant_values=False)
-    distance = distance_transform_edt(padded)
-    return (np.asarray(distance)[1:-1, 1:-1] - 0.5).astype(np.float32)
+    unsafe = np.pad(~tile.deterministic, 1, constant_values=True)
+    distance = np.sqrt(squared_distance(unsafe, limit=sum(unsafe.shape)))
+    return (distance[1:-1, 1:-1] - 0.5).astype(np.float32)
 
 
 def nearest_clear_site(tile: Tile, target: Site, clearance: float) -> Site:

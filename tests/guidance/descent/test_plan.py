@@ -16,7 +16,7 @@ START = [180.0, 120.0, 940.0, -7.0, -4.0, -28.0, 1200.0]
 
 @pytest.fixture(scope="module")
 def plan():
-    return guidance.solve_pdg(START, TARGET)
+    return guidance.solve_pdg(START, TARGET, method="convex")
 
 
 @pytest.fixture(scope="module")

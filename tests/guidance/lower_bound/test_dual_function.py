@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from guidance import PAPER_LANDER, State
 from guidance.descent.problem import LandingProblem
-from guidance.lower_bound.dual_ascent import ascend, dual_value, two_impulse_primer
+from guidance.lower_bound.dual_ascent import affine_basis, ascend, dual_value, two_impulse_primer
 from guidance.lower_bound.dual_case import dual_case
 from guidance.lower_bound.dual_function import linear_part, support, sweep_bound
 
@@ -46,7 +46,8 @@ def test_not_even_the_best_primer_of_the_flights_time(seed):
     rng = np.random.default_rng(seed)
     flight = random_flight(rng)
     case = dual_case(flight.problem, flight.spent)
-    best = ascend(1.1 * two_impulse_primer(flight.time, case), flight.time, case, 1e-4, 10.0 * flight.spent)
+    start, basis = 1.1 * two_impulse_primer(flight.time, case), affine_basis(flight.time)
+    best = ascend(start, basis, flight.time, case, 1e-4, 10.0 * flight.spent)
     assert bound_at(best.primer, flight.time, case, 300) <= flight.spent * (1.0 + 1e-6)
 
 

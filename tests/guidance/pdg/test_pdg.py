@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from descents import (
+    COMPLETE,
     FEASIBLE,
     IMPOSSIBLE,
     TARGET,
@@ -21,7 +22,6 @@ import guidance
 from guidance import InfeasibleError, Lander, PlanStatus, SolverFailedError, State
 from guidance.convex.clarabel_solver import ConicSolver
 from guidance.pdg.fallbacks import remaining_time
-from guidance.pdg.solve import METHODS
 
 NAMES = [case["name"] for case in FEASIBLE]
 START = [180.0, 120.0, 940.0, -7.0, -4.0, -28.0, 1200.0]
@@ -46,13 +46,13 @@ def check_flight(plan):
     assert (plan.position[:, 2] >= plan.problem.target[2] - 1e-3).all()
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", COMPLETE)
 @pytest.mark.parametrize("case", FEASIBLE, ids=NAMES)
 def test_reference_optima(case, method):
     plan = guidance.solve_pdg(**arguments(case), method=method)
     allowed = 0.15 if case["name"] == "mars-6-engine" else 0.03
     assert plan.status is PlanStatus.OPTIMAL
-    assert plan.method == method
+    assert plan.method == method or method == "auto"
     assert abs(plan.mass[-1] - case["optimal_final_mass"]) < allowed
     assert plan.time_of_flight == pytest.approx(case["optimal_time_of_flight"], abs=0.35)
     check_flight(plan)
@@ -60,11 +60,11 @@ def test_reference_optima(case, method):
 
 @pytest.mark.parametrize("case", FEASIBLE, ids=NAMES)
 def test_methods_agree(case):
-    masses = [guidance.solve_pdg(**arguments(case), method=method).mass[-1] for method in METHODS]
+    masses = [guidance.solve_pdg(**arguments(case), method=method).mass[-1] for method in COMPLETE]
     assert max(masses) - min(masses) < 0.05
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", COMPLETE)
 @pytest.mark.parametrize("case", IMPOSSIBLE, ids=lambda case: case["name"])
 def test_impossible_cases(case, method):
     with pytest.raises(InfeasibleError) as caught:
@@ -75,7 +75,7 @@ def test_impossible_cases(case, method):
     assert guidance.solve_pdg(**arguments(case), method=method, throw=False).status is PlanStatus.INFEASIBLE
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", COMPLETE)
 def test_infeasible_beyond_closed_form_bounds_by_every_method(method):
     plan = guidance.solve_pdg(START, [1900.0, 0.0, 50.0], method=method, nodes=31, throw=False)
     assert plan.status is PlanStatus.INFEASIBLE
@@ -83,7 +83,7 @@ def test_infeasible_beyond_closed_form_bounds_by_every_method(method):
     assert plan.certificate.verified
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", COMPLETE)
 @pytest.mark.parametrize("time_of_flight", [None, 29.0])
 @pytest.mark.parametrize(
     ("limits", "cause"), [({"glide_slope_limit": 0.2}, "glide slope"), ({"speed_limit": 29.0}, "speed")]
@@ -147,7 +147,7 @@ def test_where_relaxing_loses_the_unrelaxed_problem_answers_and_says_so(time_of_
     check_flight(plan)
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", COMPLETE)
 def test_fixed_time_by_every_method(method):
     plan = guidance.solve_pdg(START, TARGET, time_of_flight=29.0, nodes=41, method=method)
     assert plan.time_of_flight == pytest.approx(29.0)
@@ -183,7 +183,7 @@ def test_fixed_time_by_every_method(method):
         ({"time_of_flight": math.nan}, "time_of_flight"),
         ({"nodes": 2}, "nodes"),
         ({"nodes": 30.5}, "nodes"),
-        ({"method": "magic"}, "convex, casadi, cvxpy"),
+        ({"method": "magic"}, "auto, indirect, convex, casadi, cvxpy"),
         ({"unreachable": "give up"}, "unreachable"),
         ({"guess": [1, 2]}, "guess"),
     ],
@@ -215,6 +215,9 @@ def test_answers_do_not_depend_on_history():
     assert after.time_of_flight == before.time_of_flight
 
 
+FAST = ("auto", "convex")
+
+
 class Panic(BaseException):
     """Stands for a pyo3 panic."""
 
@@ -232,11 +235,11 @@ def test_a_broken_solver_is_a_status_not_an_exception(monkeypatch):
     solve = ConicSolver.solve
     monkeypatch.setattr(ConicSolver, "solve", broken)
     with ThreadPoolExecutor(1) as thread:  # solvers are kept per thread, and these must not outlive the test
-        plan = thread.submit(guidance.solve_pdg, START, TARGET, throw=False).result()
+        plan = thread.submit(guidance.solve_pdg, START, TARGET, method="convex", throw=False).result()
         assert plan.status in (PlanStatus.SOLVER_FAILED, PlanStatus.LIMIT_REACHED)
         assert plan.certificate is None
         with pytest.raises(SolverFailedError):
-            thread.submit(guidance.solve_pdg, START, TARGET).result()
+            thread.submit(guidance.solve_pdg, START, TARGET, method="convex").result()
 
 
 @pytest.mark.parametrize("scale", [0.03, 1.0, 30.0])
@@ -271,15 +274,15 @@ def disperse(sampler, count, seed, **options):
     return [guidance.solve_pdg(sampler(rng), TARGET, throw=False, **options) for _ in range(count)]
 
 
-def check_dispersed_paper_starts(count, seed):
-    plans = disperse(paper_start, count, seed)
+def check_dispersed_paper_starts(count, seed, method):
+    plans = disperse(paper_start, count, seed, method=method)
     assert {plan.status for plan in plans} == {PlanStatus.OPTIMAL}
     for plan in plans[:: max(1, count // 50)]:
         check_flight(plan)
 
 
-def check_harsh_starts(count, seed):
-    raised = disperse(harsh_start, count, seed)
+def check_harsh_starts(count, seed, method):
+    raised = disperse(harsh_start, count, seed, method=method)
     labelled = {PlanStatus.OPTIMAL, PlanStatus.INFEASIBLE, PlanStatus.LIMIT_REACHED}
     assert {plan.status for plan in raised} <= labelled
     undecided = [plan for plan in raised if plan.status is PlanStatus.LIMIT_REACHED]
@@ -288,7 +291,7 @@ def check_harsh_starts(count, seed):
         if plan.status is PlanStatus.INFEASIBLE:
             assert plan.certificate is not None
             assert plan.certificate.verified
-    nearest = disperse(harsh_start, count, seed, unreachable="nearest")
+    nearest = disperse(harsh_start, count, seed, method=method, unreachable="nearest")
     saved = 0
     for plan, other in zip(raised, nearest, strict=True):
         if plan.status is PlanStatus.OPTIMAL:
@@ -299,8 +302,8 @@ def check_harsh_starts(count, seed):
         check_flight(plan)
 
 
-def check_feasible_starts(count, seed):
-    plans = disperse(feasible_start, count, seed)
+def check_feasible_starts(count, seed, method):
+    plans = disperse(feasible_start, count, seed, method=method)
     spurious = [plan.problem.state for plan in plans if plan.status is not PlanStatus.OPTIMAL]
     assert not spurious
 
@@ -321,16 +324,19 @@ def check_strong_engines(count, seed):
     assert sum(plan.method == "casadi" for plan in flights) > 0.02 * count  # the fallback is exercised
 
 
-def test_dispersed_paper_starts():
-    check_dispersed_paper_starts(200, 11)
+@pytest.mark.parametrize("method", FAST)
+def test_dispersed_paper_starts(method):
+    check_dispersed_paper_starts(200, 11, method)
 
 
-def test_harsh_starts():
-    check_harsh_starts(60, 12)
+@pytest.mark.parametrize("method", FAST)
+def test_harsh_starts(method):
+    check_harsh_starts(60, 12, method)
 
 
-def test_no_spurious_infeasibility():
-    check_feasible_starts(100, 13)
+@pytest.mark.parametrize("method", FAST)
+def test_no_spurious_infeasibility(method):
+    check_feasible_starts(100, 13, method)
 
 
 def test_engines_that_cannot_hover():
@@ -343,18 +349,58 @@ def test_many_engines_that_cannot_hover():
 
 
 @pytest.mark.slow
-def test_many_dispersed_paper_starts():
-    check_dispersed_paper_starts(2000, 21)
+@pytest.mark.parametrize("method", FAST)
+def test_many_dispersed_paper_starts(method):
+    check_dispersed_paper_starts(2000, 21, method)
 
 
 @pytest.mark.slow
-def test_many_harsh_starts():
-    check_harsh_starts(500, 22)
+@pytest.mark.parametrize("method", FAST)
+def test_many_harsh_starts(method):
+    check_harsh_starts(500, 22, method)
 
 
 @pytest.mark.slow
-def test_no_spurious_infeasibility_on_many():
-    check_feasible_starts(500, 23)
+@pytest.mark.parametrize("method", FAST)
+def test_no_spurious_infeasibility_on_many(method):
+    check_feasible_starts(500, 23, method)
+
+
+def test_auto_says_what_it_chose():
+    """Exact where no limit binds; else as the convex method, which is asked next."""
+    free = guidance.solve_pdg(START, TARGET)
+    assert free.method == "indirect"
+    assert free.solves == 0
+    choices: list[dict[str, Any]] = [
+        {"lander": Lander(pointing_limit=0.4)},
+        {"speed_limit": 45.0},
+        {"glide_slope_limit": 0.3},
+    ]
+    for limits in choices:
+        bound = guidance.solve_pdg(START, TARGET, **limits)
+        convex = guidance.solve_pdg(START, TARGET, method="convex", **limits)
+        assert bound.method == "convex"
+        assert bound.thrust.tobytes() == convex.thrust.tobytes()
+    late = guidance.solve_pdg(START, TARGET, target_velocity=[0.0, 0.0, -1.0])
+    assert late.method == "convex"
+
+
+def test_the_indirect_method_alone_says_that_others_may_know():
+    plan = guidance.solve_pdg(START, TARGET, speed_limit=45.0, method="indirect", throw=False)
+    assert plan.status is PlanStatus.LIMIT_REACHED
+    assert "method 'auto' asks others" in plan.message
+    nowhere = guidance.solve_pdg([0, 0, 110, 0, 0, -60, 1200], TARGET, method="indirect", throw=False)
+    assert nowhere.status is PlanStatus.INFEASIBLE
+
+
+def test_what_auto_gains_is_what_a_mesh_costs():
+    """Exact flights are cheaper than those on 61 nodes, by grams."""
+    rng = np.random.default_rng(17)
+    for _ in range(30):
+        start = paper_start(rng)
+        exact, mesh = guidance.solve_pdg(start, TARGET), guidance.solve_pdg(start, TARGET, method="convex")
+        assert exact.method == "indirect"
+        assert -1e-4 < mesh.propellant - exact.propellant < 0.01
 
 
 def test_nearest_is_feasible_cheaper_ones_are_not_and_nearer_ones_neither():
@@ -442,6 +488,6 @@ def test_free_time_takes_at_most_two_solves():
     """The indirect method gives the time of flight; `python -m studies.bench` says what that costs."""
     rng = np.random.default_rng(8)
     for _ in range(15):
-        free = guidance.solve_pdg(paper_start(rng), TARGET)
+        free = guidance.solve_pdg(paper_start(rng), TARGET, method="convex")
         assert free.status is PlanStatus.OPTIMAL
         assert 1 <= free.solves <= 2

@@ -27,7 +27,7 @@ def test_naming_the_package_imports_no_solver():
 
 
 def test_convex_solver_uses_neither_reference_nor_their_libraries():
-    loaded = modules_after("guidance.solve_pdg([0, 0, 300, 0, 0, -5, 1200], [0, 0, 0])")
+    loaded = modules_after("guidance.solve_pdg([0, 0, 300, 0, 0, -5, 1200], [0, 0, 0], method='convex')")
     assert "clarabel" in loaded
     assert not loaded & {
         "cvxpy",

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from studies.campaign.rows import ROW_COLUMNS
+from hda.flight.episode_row import ROW_COLUMNS
 from studies.campaign.shards import SHARD_FORMAT, ShardError, read_shard, shard_path
 
 SHARD = shard_path(Path(__file__).parent / "shard_format_1", 0, 3)

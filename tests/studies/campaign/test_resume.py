@@ -17,9 +17,11 @@ import pytest
 
 from hda.task.presets import PRESETS
 from studies.campaign import monte_carlo
+from studies.campaign.claimed_folder import Existing, FolderError
+from studies.campaign.command_line import resumable
 from studies.campaign.executor import WorkerDiedError
 from studies.campaign.monte_carlo import Chunk, Study, chunk_bounds, fly_chunk, fly_chunks
-from studies.campaign.study_folder import Existing, FolderError, StudyFolder, open_study_folder
+from studies.campaign.study_folder import StudyFolder, open_study_folder
 from studies.compare.command import Comparison, compare
 
 POLICIES = ("no-divert", "single-divert")
@@ -193,11 +195,41 @@ def test_a_study_is_not_overwritten_unless_asked(tmp_path: Path) -> None:
     assert all(path.read_text() == "mine" for path in kept)
 
 
+def test_a_folder_that_was_half_removed_is_still_that_study(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Else the new study would take the shards that are left for its own."""
+    compare(options(tmp_path, episodes=20))
+    unlink = Path.unlink
+
+    def stopped(path: Path, missing_ok: bool = False) -> None:
+        if path.name.startswith("episodes-") and path.suffix == ".jsonl":
+            raise KeyboardInterrupt
+        unlink(path, missing_ok)
+
+    monkeypatch.setattr(Path, "unlink", stopped)
+    with pytest.raises(KeyboardInterrupt):
+        compare(options(tmp_path, episodes=20, study_seed=1, overwrite=True))
+    monkeypatch.undo()
+    with pytest.raises(FolderError, match="holds a study already"):
+        compare(options(tmp_path, episodes=20, study_seed=1))
+    with pytest.raises(FolderError, match=r"study\.study_seed was 0, is 1"):
+        compare(options(tmp_path, episodes=20, study_seed=1, resume=True))
+
+
+@pytest.mark.parametrize("way", ["--resume goes on", "the same command goes on"])
+def test_a_user_who_stops_a_study_reads_how_it_goes_on(capfd: pytest.CaptureFixture[str], way: str) -> None:
+    with pytest.raises(SystemExit) as stopped, resumable(way):
+        raise KeyboardInterrupt
+    assert stopped.value.code == 130
+    assert f"finished work is kept, {way}" in " ".join(capfd.readouterr().err.split())
+
+
 def test_tables_without_shards_are_a_study_too(tmp_path: Path) -> None:
     (tmp_path / "episodes.csv").write_text("policy\n")
     with pytest.raises(FolderError, match="holds a study already"):
         compare(options(tmp_path))
-    with pytest.raises(FolderError, match="no shards"):
+    with pytest.raises(FolderError, match="no finished work"):
         compare(options(tmp_path, resume=True))
 
 
@@ -205,7 +237,8 @@ HOLD = """
 import sys, time
 from pathlib import Path
 from tests.studies.campaign.test_resume import STUDY
-from studies.campaign.study_folder import Existing, open_study_folder
+from studies.campaign.claimed_folder import Existing
+from studies.campaign.study_folder import open_study_folder
 with open_study_folder(Path(sys.argv[1]), STUDY, Existing.RESUME):
     print("held", flush=True)
     time.sleep(60)

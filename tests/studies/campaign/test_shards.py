@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from hda.flight.episode_row import EpisodeRow
 from studies.campaign.monte_carlo import Chunk
-from studies.campaign.rows import EpisodeRow
 from studies.campaign.shards import ShardError, read_shard, shard_path, write_durably, write_shard
 
 KINDS = {

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from hda.flight.episode_row import MEASURES, EpisodeRow
 from studies.campaign.monte_carlo import Chunk
-from studies.campaign.rows import MEASURES, EpisodeRow
 from studies.compare.differences import compare_pairs, write_paired
 from studies.compare.scores import StudyScores, score_study
 from studies.statistics.paired import holm_adjust, paired_ratio_interval

@@ -18,10 +18,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from hda.flight.episode_row import EpisodeRow
 from hda.task.presets import PRESETS
 from hda.task.scenario import sample_scenario
 from studies.campaign.monte_carlo import Chunk, Study
-from studies.campaign.rows import EpisodeRow
 from studies.compare.command import Comparison, compare
 from studies.compare.flights import (
     FAILED_PER_POLICY,

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from hda.flight.episode_row import MEASURES, EpisodeRow
 from studies.campaign.monte_carlo import Chunk
-from studies.campaign.rows import MEASURES, EpisodeRow
 from studies.compare import histograms
 from studies.compare.histograms import BINS, DecisionTimes, MeasureHistograms
 from studies.compare.scores import score_study

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from hda.flight.episode_row import MEASURES, EpisodeRow
 from studies.campaign.episode_files import write_episodes
 from studies.campaign.monte_carlo import Chunk
-from studies.campaign.rows import MEASURES, EpisodeRow
 from studies.compare.scores import score_study
 from studies.compare.table import PolicySummary, summarize_policy, write_table
 from studies.statistics.ratios import clustered_interval, mcnemar_p_value, wilson_interval

@@ -1,0 +1,174 @@
+"""The flight of the indirect method, exact: a burn, a coast and a burn along an affine primer, on nodes."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from guidance.arrays import Array
+from guidance.descent.problem import LandingProblem
+from guidance.descent.trajectory import Trajectory
+from guidance.flight_time.extremal import Burn, Extremal, PrimerProblem, add_burn, set_primer
+from guidance.flight_time.primer_vector import PrimerFlight
+from guidance.kernel import compile_kernel
+
+_SLIVER = 1e-9
+"""Of the time of flight: how far the two nodes of a switch, one before it and one after, lie apart."""
+_LONGEST_PART = 0.1  # of the time of flight: of a burn, in its quadrature
+
+
+@dataclass(frozen=True, eq=False)
+class PrimerTrajectory(Trajectory):
+    """Full thrust along the primer in the first and the last burn, none between; nothing is interpolated.
+
+    Each arc has nodes at both of its ends, so that a switch has two: the thrust before it and the thrust
+    after it, a billionth of the flight later. Within an arc the intervals are equal.
+
+    Attributes:
+        flight: the arcs and the primer.
+        max_thrust: [N].
+    """
+
+    flight: PrimerFlight
+    max_thrust: float
+
+    def states_at(self, time: Array, gravity: Array) -> tuple[Array, Array]:
+        """Position [m] and velocity [m/s], shape (k, 3) each, exact; as `Trajectory.states_at`."""
+        scale = self.max_thrust / float(self.mass[0])
+        problem = PrimerProblem(np.zeros(3), self.velocity[0] / scale, gravity / scale, self.flight.burn_rate)
+        states = _states(self.flight.extremal, problem, np.array(time, dtype=np.float64))
+        return self.position[0] + scale * states[:, :3], scale * states[:, 3:6]
+
+    def mass_at(self, time: Array) -> Array:
+        """[kg] shape (k,), exact; as `Trajectory.mass_at`."""
+        flight, times = self.flight, np.asarray(time, dtype=np.float64)
+        burning = np.minimum(times, flight.first_burn) + np.maximum(times - flight.braking, 0.0)
+        return self.mass[0] * (1.0 - flight.burn_rate * burning)
+
+    def sample_thrust(self, parts: int) -> Array:
+        """[N] thrust within the intervals, shape (N - 1, parts + 1, 3); as `Trajectory.sample_thrust`."""
+        out = np.empty((self.nodes - 1, parts + 1, 3))
+        _sample(self.flight.extremal, self.max_thrust, np.array(self.time), out)
+        return out
+
+    def _thrust_within(self, time: Array) -> Array:
+        flat = np.array(time, dtype=np.float64).reshape(-1)
+        return _thrust(self.flight.extremal, self.max_thrust, flat).reshape((*np.shape(time), 3))
+
+
+def lay_nodes(problem: LandingProblem, flight: PrimerFlight, nodes: int) -> PrimerTrajectory:
+    """A flight of the indirect method on nodes.
+
+    Args:
+        problem: that it solves.
+        flight: the flight.
+        nodes: N, shared among the arcs by their durations; two for each arc at least.
+    """
+    lander, state, extremal = problem.lander, problem.state, flight.extremal
+    times = _node_times(extremal, nodes)
+    scale = lander.max_thrust / state.mass
+    scaled = PrimerProblem(
+        problem.offset / scale, state.velocity / scale, problem.gravity / scale, flight.burn_rate
+    )
+    states = _states(extremal, scaled, times)
+    position, velocity = problem.target + scale * states[:, :3], scale * states[:, 3:6]
+    position[0], velocity[0] = state.position, state.velocity
+    thrust, mass = _thrust(extremal, lander.max_thrust, times), state.mass * states[:, 6]
+    return PrimerTrajectory(
+        times, position, velocity, mass, thrust, lander.exhaust_velocity, flight, lander.max_thrust
+    )
+
+
+@compile_kernel
+def _node_times(x: Extremal, nodes: int) -> Array:
+    """[s] the nodes of every arc, from the start to the end."""
+    final, begin, share, laid = x.times[2], 0.0, 0.0, 0
+    arcs = 3 if x.times[0] > 0.0 else 2
+    free = max(nodes - 2 * arcs, 0)
+    out = np.empty(2 * arcs + free)
+    for k in range(3 - arcs, 3):
+        end = x.times[k]
+        before = round(share)
+        share += free * (end - max(begin, 0.0)) / final
+        count = 2 + (free if k == 2 else round(share)) - before
+        for node in range(count):
+            out[laid + node] = begin + (end - begin) * node / (count - 1)
+        laid += count
+        out[laid - 1] = end
+        begin = end + _SLIVER * final
+    return out
+
+
+@compile_kernel
+def _burning(x: Extremal, time: float) -> bool:
+    """Whether the engine burns; at a switch it does what it did before."""
+    return 0.0 <= time <= x.times[0] or time > x.times[1]
+
+
+@compile_kernel
+def _set_thrust(x: Extremal, time: float, out: Array) -> None:
+    """Unit vector of the primer, shape (3,)."""
+    set_primer(x, time, out)
+    size = max(math.sqrt(out[0] * out[0] + out[1] * out[1] + out[2] * out[2]), 1e-12)
+    for axis in range(3):
+        out[axis] /= size
+
+
+@compile_kernel
+def _thrust(x: Extremal, max_thrust: float, times: Array) -> Array:
+    """[N] shape (k, 3)."""
+    out = np.zeros((times.size, 3))
+    for k in range(times.size):
+        if _burning(x, times[k]):
+            _set_thrust(x, times[k], out[k])
+            out[k] *= max_thrust
+    return out
+
+
+@compile_kernel
+def _sample(x: Extremal, max_thrust: float, times: Array, out: Array) -> None:
+    """Write the thrust [N] within each interval to `out`, shape (N - 1, parts + 1, 3)."""
+    parts = out.shape[1] - 1
+    for k in range(times.size - 1):
+        step = (times[k + 1] - times[k]) / parts
+        burning = _burning(x, 0.5 * (times[k] + times[k + 1]))
+        for part in range(parts + 1):
+            if burning:
+                _set_thrust(x, times[k] + part * step, out[k, part])
+                out[k, part] *= max_thrust
+            else:
+                out[k, part] = 0.0
+
+
+@compile_kernel
+def advance_extremal(x: Extremal, problem: PrimerProblem, begin: float, end: float, state: Array) -> None:
+    """Take position, velocity and mass, shape (7,) in the units of `PrimerProblem`, to a later time."""
+    step = end - begin
+    for axis in range(3):
+        fall = problem.gravity[axis] * step
+        state[axis] += (state[3 + axis] + 0.5 * fall) * step
+        state[3 + axis] += fall
+    for first, last in ((begin, min(x.times[0], end)), (max(x.times[1], begin), end)):
+        burn = last - first
+        if burn <= 0.0:
+            continue
+        parts = 1 + int(burn / (_LONGEST_PART * x.times[2]))
+        for part in range(parts):
+            at = first + burn * part / parts
+            add_burn(x, Burn(at, at + burn / parts, state[6]), problem.mass_flow, end, state)
+            state[6] -= problem.mass_flow * burn / parts
+
+
+@compile_kernel
+def _states(x: Extremal, problem: PrimerProblem, times: Array) -> Array:
+    """Position, velocity and mass at given times, shape (k, 7), in the units of `PrimerProblem`."""
+    out, state, time = np.empty((times.size, 7)), np.empty(7), math.inf
+    for k in range(times.size):
+        if times[k] < time:  # times need not rise
+            state[:3], state[3:6] = problem.position, problem.velocity
+            state[6], time = 1.0, 0.0
+        advance_extremal(x, problem, time, times[k], state)
+        out[k], time = state, times[k]
+    return out

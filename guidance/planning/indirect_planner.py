@@ -1,0 +1,30 @@
+"""The flight of the indirect method as a plan: exact burns and coast, where no limit of the problem binds."""
+
+from __future__ import annotations
+
+from guidance.descent.plan import Plan, PlanStatus
+from guidance.descent.problem import LandingProblem
+from guidance.flight_time.primer_trajectory import lay_nodes
+from guidance.flight_time.primer_vector import PrimerFlight
+
+METHOD = "indirect"
+NOT_FOUND = (
+    "the indirect method found no flight that keeps the limits; it knows no least thrust, no velocity at the"
+    " target and no limit that binds, and method 'auto' asks others then"
+)
+
+
+def plan_indirect(problem: LandingProblem, nodes: int, flight: PrimerFlight | None) -> Plan:
+    """Plan along a flight of the indirect method.
+
+    Args:
+        problem: what it solves.
+        nodes: N, shared among the arcs; two for each arc at least.
+        flight: what `find_primer_flight` found.
+
+    Returns:
+        A plan that is OPTIMAL; or LIMIT_REACHED where there is no flight: others may find one.
+    """
+    if flight is None:
+        return Plan(PlanStatus.LIMIT_REACHED, problem, METHOD, message=NOT_FOUND)
+    return Plan.of_flight(PlanStatus.OPTIMAL, problem, METHOD, lay_nodes(problem, flight, nodes))
