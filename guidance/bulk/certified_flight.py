@@ -11,6 +11,7 @@ import numpy as np
 from guidance.arrays import Array
 from guidance.descent.problem import ROUNDING
 from guidance.flight_time.extremal import Extremal, PrimerProblem, fly_extremal
+from guidance.flight_time.linear_system import dot
 from guidance.flight_time.path_limits import KEPT, POINTING, PathLimits, broken_limit
 from guidance.flight_time.primer_equations import LEAST_PULL, MOST_PULL, solve_primer
 from guidance.kernel import compile_kernel
@@ -128,7 +129,7 @@ def offset_from(state: Array, target: Array, limits: PathLimits) -> Array:
         cosine, sine = math.cos(limits.glide_slope), math.sin(limits.glide_slope)
         across = math.hypot(offset[0], offset[1])
         outside = cosine * across - sine * offset[2]
-        if 0.0 < outside <= ROUNDING * max(1.0, math.sqrt(offset @ offset)):
+        if 0.0 < outside <= ROUNDING * max(1.0, math.sqrt(dot(offset, offset))):
             offset[:2] *= 1.0 - outside * cosine / across
             offset[2] += outside * sine
     return offset
@@ -149,14 +150,14 @@ def scale_start(state: Array, target: Array, vehicle: Vehicle) -> PrimerProblem:
 @compile_kernel
 def domain_of(problem: PrimerProblem, min_thrust: float) -> int:
     """Why the indirect method does not know a problem, as a `Finding`; OPTIMAL where it does."""
-    pull = problem.gravity @ problem.gravity
+    pull = dot(problem.gravity, problem.gravity)
     if min_thrust > 0.0:
         return _LEAST_THRUST
     if not pull > LEAST_PULL:
         return _NO_GRAVITY
     if not pull < MOST_PULL:
         return _WEAK_ENGINE
-    return _OPTIMAL if problem.position @ problem.gravity < 0.0 else _NOT_ABOVE
+    return _OPTIMAL if dot(problem.position, problem.gravity) < 0.0 else _NOT_ABOVE
 
 
 @compile_kernel

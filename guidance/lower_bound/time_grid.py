@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from guidance.arrays import Array
+from guidance.flight_time.linear_system import dot
 from guidance.kernel import compile_kernel
 from guidance.lower_bound.dual_case import DualCase
 
@@ -19,10 +20,10 @@ _LONGEST = 1e4  # times the first: the last one of the grid where gravity is too
 @compile_kernel
 def longest_time(case: DualCase, target: float, time: float) -> float:
     """[s] the time beyond which gravity alone spends `target` [m/s], or far beyond `time` [s]."""
-    pull = math.sqrt(case.gravity @ case.gravity)
+    pull = math.sqrt(dot(case.gravity, case.gravity))
     longest = _LONGEST * time
     if pull > 0.0:
-        enough = (target + float(case.gravity @ (case.arrival - case.velocity)) / pull) / pull
+        enough = (target + dot(case.gravity, case.arrival - case.velocity) / pull) / pull
         longest = max(min(longest, enough), time)
     return longest
 
