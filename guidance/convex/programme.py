@@ -37,7 +37,8 @@ class ConvexSolution:
         layout: indices into the primal one.
         scaled: the numbers it was solved with.
         rows: the constraint rows it was solved with, condensed or whole.
-        value: what was minimised: ln(start mass / final mass), or the landing error [m].
+        value: what was minimised: ln(start mass / final mass), with the price of the landing error where it
+            has one; or the landing error [m].
         slope: derivative of `value` with respect to the time of flight, from the dual solution.
     """
 
@@ -127,34 +128,52 @@ class ConvexTemplate:
         """Constraint rows for given numbers."""
         return [self._constant.get(family) or family(self.layout, scaled) for family in self._families]
 
-    def cost(self, least_error: bool) -> Array:
-        """Cost vector: the landing error, or the negative final log-mass."""
+    def cost(self, least_error: bool, price: float = 0.0) -> Array:
+        """Cost vector: the landing error, or the negative final log-mass and the landing error at a price."""
         cost = np.zeros(self.layout.size)
         if least_error:
             cost[self._whole.landing_error] = 1.0
         else:
             cost[self.layout.log_mass[-1]] = -1.0
-        return cost
+        if price > 0.0:
+            cost[self._whole.landing_error] = price
+        return cost / (1.0 + price)
 
-    def solve(self, scaled: ScaledProblem, least_error: bool = False) -> ConvexSolution:
-        """Solve with new numbers."""
-        rows, cost = self.rows(scaled), self.cost(least_error)
+    def solve(
+        self, scaled: ScaledProblem, least_error: bool = False, error_price: float = 0.0
+    ) -> ConvexSolution:
+        """Solve with new numbers.
+
+        Args:
+            scaled: the numbers.
+            least_error: whether to minimise the landing error in place of the propellant.
+            error_price: [1/m] what a landing error costs beside the propellant, in ln(mass).
+        """
+        price = error_price * scaled.length / scaled.kappa
+        rows, cost = self.rows(scaled), self.cost(least_error, price)
         answer = self._assembly.solve(rows, cost)
         unsure = answer.status in (SolveStatus.FAILED, SolveStatus.LIMIT_REACHED)
         if unsure and self._condensed is None:
             answer = self._assembly.solve(rows, cost, refine=True)
-        return self.read_answer(scaled, rows, answer, least_error)
+        return self.read_answer(scaled, rows, answer, least_error, price)
 
     def read_answer(
-        self, scaled: ScaledProblem, rows: list[Rows], answer: ConicAnswer, least_error: bool = False
+        self,
+        scaled: ScaledProblem,
+        rows: list[Rows],
+        answer: ConicAnswer,
+        least_error: bool = False,
+        price: float = 0.0,
     ) -> ConvexSolution:
-        """What a conic solver's answer to `rows(scaled)` and `cost(least_error)` says."""
+        """What a conic solver's answer to `rows(scaled)` and `cost(least_error, price)` says."""
         if answer.status is not SolveStatus.SOLVED:
             return ConvexSolution(answer, self._whole, scaled, rows, np.nan, np.nan)
-        cost = self.cost(least_error)
-        unit, power = (scaled.length, 2) if least_error else (scaled.kappa, 1)
+        cost = self.cost(least_error, price)
+        unit, power = (scaled.length, 2) if least_error else (scaled.kappa * (1.0 + price), 1)
         value = float(cost @ answer.primal)
         sensitivity = self._sensitivity(rows, answer)
+        if price > 0.0:  # it goes with the time of flight
+            sensitivity += float(cost[self._whole.landing_error] * answer.primal[self._whole.landing_error])
         slope = unit * (power * value + sensitivity) / scaled.time
         if self._condensed is not None:
             answer = replace(answer, primal=expand(self._condensed, scaled, answer.primal))

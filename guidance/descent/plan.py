@@ -25,6 +25,8 @@ class PlanStatus(Enum):
     """Least propellant to the target."""
     NEAREST = "nearest"
     """The target is out of reach: least propellant to the reachable point nearest to it."""
+    WEIGHED = "weighed"
+    """Least propellant and landing error, weighed against each other; the landing point is free."""
     INFEASIBLE = "infeasible"
     """No flight exists within the scope that the certificate states."""
     SOLVER_FAILED = "solver failed"
@@ -35,7 +37,7 @@ class PlanStatus(Enum):
     @property
     def has_flight(self) -> bool:
         """Whether the plan holds a trajectory."""
-        return self in (PlanStatus.OPTIMAL, PlanStatus.NEAREST)
+        return self in (PlanStatus.OPTIMAL, PlanStatus.NEAREST, PlanStatus.WEIGHED)
 
 
 @dataclass(frozen=True, eq=False)

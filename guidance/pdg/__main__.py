@@ -44,6 +44,7 @@ class PdgCommand:
         method: auto takes indirect where no limit binds, else convex; cvxpy and casadi are independent
             references.
         unreachable: Fail, or land at the reachable point nearest to the target.
+        landing_error_weight: Minimise propellant plus this [kg/m] times the landing error.
         plot: File to draw the plan into, such as plan.png.
     """
 
@@ -68,6 +69,7 @@ class PdgCommand:
     nodes: int = DEFAULT_NODES
     method: PlanningMethod = "auto"
     unreachable: Literal["raise", "nearest"] = "raise"
+    landing_error_weight: float | None = None
     plot: Path | None = None
 
     @property
@@ -103,6 +105,7 @@ class PdgCommand:
             nodes=self.nodes,
             method=self.method,
             unreachable=self.unreachable,
+            landing_error_weight=self.landing_error_weight,
             target_velocity=self.target_velocity,
         )
 

@@ -24,6 +24,7 @@ from guidance.descent.plan import Plan, PlanStatus
 from guidance.descent.problem import LandingProblem
 from guidance.descent.trajectory import Trajectory
 from guidance.flight_time.primer_vector import PrimerFlight, find_primer_flight
+from guidance.pdg.unrelaxed import plan_unrelaxed
 from guidance.state import State
 
 if TYPE_CHECKING:
@@ -34,7 +35,6 @@ MOST_NODES = 1000
 
 _NOT_CURED_BY_NODES = ("thrust_below", "pointing", "final_thrust_direction", "propellant")
 _OUT_OF_REACH = "the thrust and the propellant on board do not suffice for any flight to the target"
-_LOCAL_GAP = 2e-3  # of propellant, over the relaxed flight's: not worth another guess
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +49,7 @@ class Request:
         guess: an earlier plan of nearly the same flight, or None.
         provisional: whether the plan will be replaced before it is flown to its end, as in closed loop: it is
             taken as it is found, on its mesh and near the best time.
+        landing_error_weight: [kg/m] price of a landing error; None lands at the target.
     """
 
     problem: LandingProblem
@@ -57,16 +58,20 @@ class Request:
     method: str
     guess: Plan | None = None
     provisional: bool = False
+    landing_error_weight: float | None = None
 
     @cached_property
     def flight(self) -> PrimerFlight | None:
         """What the indirect method finds."""
+        if self.landing_error_weight is not None:
+            return None
         return find_primer_flight(self.problem, self.time_of_flight)
 
     @property
     def bounds_first(self) -> bool:
         """Whether the dual bound is asked before any search."""
-        return self.time_of_flight is None and self.method in ("auto", "convex") and not self.problem.rotates
+        asked = self.time_of_flight is None and self.method in ("auto", "convex")
+        return asked and self.landing_error_weight is None and not self.problem.rotates
 
     def finer(self, nodes: int, found: Plan) -> Request:
         """The same on more nodes, from the plan found so far."""
@@ -95,7 +100,7 @@ def answer(request: Request, unreachable: str) -> Plan:
     plan = plan_by_method(request)
     if request.provisional and unreachable == "raise":
         return plan
-    if plan.status is not PlanStatus.OPTIMAL:
+    if not plan.status.has_flight:
         plan = answer_without_flight(plan, request, unreachable)
     if request.provisional:
         return plan
@@ -160,49 +165,30 @@ def _plan_convex(request: Request) -> Plan:
 
 def _plan_convex_from(request: Request, seed: float | None) -> Plan:
     """The same, with the time [s] from which the search starts where the indirect method has none."""
-    from guidance.planning.convex_planner import plan_convex
+    from guidance.planning.convex_planner import plan_convex, plan_weighed
 
+    problem, nodes, weight = request.problem, request.nodes, request.landing_error_weight
     flight = None if request.time_of_flight is not None else request.flight
-    found = plan_convex(
-        request.problem, request.nodes, request.time_of_flight, seed, request.provisional, flight
-    )
+    if weight is None:
+        found = plan_convex(problem, nodes, request.time_of_flight, seed, request.provisional, flight)
+    else:
+        found = plan_weighed(problem, nodes, weight, request.time_of_flight, request.provisional)
     if found.lossy_flight is None:
         return found.plan
-    return _plan_unrelaxed(found.plan, found.lossy_flight, request.time_of_flight)
-
-
-def _plan_unrelaxed(lost: Plan, relaxed: Trajectory, time_of_flight: float | None) -> Plan:
-    """Ask the unrelaxed problem where relaxing lost something: a local method, so from several guesses.
-
-    A flight that burns hardly more than the relaxed one ends the search; otherwise the best of all counts.
-    """
-    from guidance.reference.casadi_planner import plan_casadi
-    from guidance.reference.trajectory_guess import swing_sideways
-
-    problem, solves = lost.problem, lost.solves
-    bound = float(relaxed.mass[0] - relaxed.mass[-1])
-    best, said = lost, []
-    for guess in (relaxed, swing_sideways(problem, relaxed, in_plane=True), None):
-        start = None if guess is None else Plan.of_flight(PlanStatus.OPTIMAL, problem, lost.method, guess)
-        found = plan_casadi(problem, relaxed.nodes, time_of_flight, start)
-        solves += found.solves
-        said.append(found.message)
-        if found.status.has_flight and not best.propellant <= found.propellant:
-            best = found
-        if best.propellant <= (1.0 + _LOCAL_GAP) * bound:
-            break
-    message = best.message if best.status.has_flight else said[0]
-    return replace(best, solves=solves, message=f"{message}; {lost.message}")
+    return plan_unrelaxed(found.plan, found.lossy_flight, request.time_of_flight, weight)
 
 
 def _plan_casadi(request: Request) -> Plan:
     """The unrelaxed problem; where its local method finds no flight, from that of the convex problem."""
     from guidance.reference.casadi_planner import plan_casadi
 
-    problem, time_of_flight = request.problem, request.time_of_flight
-    plan = plan_casadi(problem, request.nodes, time_of_flight, request.guess)
+    def ask(nodes: int, guess: Plan | None) -> Plan:
+        weight = request.landing_error_weight
+        return plan_casadi(request.problem, nodes, request.time_of_flight, guess, landing_error_weight=weight)
+
+    plan = ask(request.nodes, request.guess)
     if not request.provisional:
-        plan = within_limits(plan, lambda finer, found: plan_casadi(problem, finer, time_of_flight, found))
+        plan = within_limits(plan, ask)
     if plan.status not in (PlanStatus.SOLVER_FAILED, PlanStatus.LIMIT_REACHED):
         return plan
     convex = _plan_convex(replace(request, guess=None))
@@ -210,7 +196,7 @@ def _plan_casadi(request: Request) -> Plan:
         return plan
     if convex.method == plan.method:  # relaxing lost: it has asked already
         return replace(convex, solves=plan.solves + convex.solves)
-    again = plan_casadi(problem, request.nodes, time_of_flight, convex)
+    again = ask(request.nodes, convex)
     return replace(again, solves=plan.solves + convex.solves + again.solves)
 
 
@@ -248,8 +234,8 @@ def answer_without_flight(plan: Plan, request: Request, unreachable: str) -> Pla
     from guidance.planning.convex_planner import plan_nearest
 
     problem, nodes, time_of_flight = request.problem, request.nodes, request.time_of_flight
-    anywhere = False
-    if unreachable == "nearest":
+    anywhere = request.landing_error_weight is not None
+    if unreachable == "nearest" and not anywhere:
         nearest = plan_nearest(problem, nodes, time_of_flight, request.provisional)
         nearest = replace(nearest, solves=plan.solves + nearest.solves)
         if nearest.status.has_flight:

@@ -47,6 +47,7 @@ def solve_pdg(
     nodes: int = DEFAULT_NODES,
     method: PlanningMethod = "auto",
     unreachable: Literal["raise", "nearest"] = "raise",
+    landing_error_weight: float | None = None,
     guess: Plan | None = None,
     throw: bool = True,
 ) -> Plan:
@@ -72,6 +73,8 @@ def solve_pdg(
             IPOPT).
         unreachable: what to do where the target is out of reach: 'raise', or plan to the softly reachable
             point 'nearest' to it in its plane (always by the convex method).
+        landing_error_weight: [kg/m] minimise propellant + weight x landing error, with a landing point that
+            is free in the target's plane; by 'auto', 'convex' or 'casadi'. None lands at the target.
         guess: an earlier Plan of nearly the same flight, for a search that the indirect method cannot start.
         throw: raise where there is no flight; otherwise return a Plan that says why.
 
@@ -93,7 +96,9 @@ def solve_pdg(
         finite_vector("angular_velocity", angular_velocity, 3),
     )
     _check_choices(nodes, method, unreachable, guess)
-    plan = answer(Request(problem, nodes, _seconds(time_of_flight), method, guess), unreachable)
+    weight = _weight(landing_error_weight, method)
+    request = Request(problem, nodes, _seconds(time_of_flight), method, guess, landing_error_weight=weight)
+    plan = answer(request, unreachable)
     if problem.arrived and time_of_flight is None:
         plan = replace(plan, message=f"{plan.message}; {ARRIVED}")
     if throw and not plan.status.has_flight:
@@ -138,6 +143,14 @@ def _with_shorthands(limits: Limits, **shorthands: float | None) -> Limits:
         except ValueError as error:
             raise ValueError(str(error).replace(f"limits.{name}", f"{name}_limit")) from None
     return limits
+
+
+def _weight(landing_error_weight: float | None, method: str) -> float | None:
+    if landing_error_weight is None:
+        return None
+    if method in ("indirect", "cvxpy"):
+        raise ValueError(f"landing_error_weight: method '{method}' lands at the target")
+    return finite_number("landing_error_weight", landing_error_weight, at_least=0.0)
 
 
 def _seconds(time_of_flight: float | None) -> float | None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from guidance.exports import lazy_exports
 
 if TYPE_CHECKING:
-    from guidance.planning.convex_planner import plan_convex, plan_nearest, prove_infeasible
+    from guidance.planning.convex_planner import plan_convex, plan_nearest, plan_weighed, prove_infeasible
     from guidance.planning.convex_task import ConvexTask
     from guidance.planning.deferred_decision import DeferredDecision, TrunkOptions, plan_deferred
     from guidance.planning.reachability import ReachableSet, reachable_set
@@ -19,6 +19,7 @@ _HOMES = {
     "guidance.planning.convex_planner": (
         "plan_convex",
         "plan_nearest",
+        "plan_weighed",
         "prove_infeasible",
     ),
     "guidance.planning.convex_task": ("ConvexTask",),
@@ -41,6 +42,7 @@ __all__ = [
     "plan_convex",
     "plan_deferred",
     "plan_nearest",
+    "plan_weighed",
     "prove_infeasible",
     "reachable_set",
 ]

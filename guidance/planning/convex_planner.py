@@ -1,4 +1,4 @@
-"""Plans by convex optimisation: to the target, or to the softly reachable point nearest to it."""
+"""Plans by convex optimisation: to the target, to the softly reachable point nearest to it, or between."""
 
 from __future__ import annotations
 
@@ -26,6 +26,8 @@ _OVERDRAFT = 1e-9  # in ln(mass): rounding of the solver
 _REPLAN_TOLERANCE = 1.5e-5  # in ln(mass), as LOG_MASS_TOLERANCE: 18 g at 1200 kg
 _WORTH_A_SEARCH = 4e-5  # gain in ln(mass) that a time found with relaxed bounds may promise to another time
 _ERROR_TOLERANCE = 0.02  # [m] gain in landing error below which the time search stops
+_MOST_PRICES = 6  # of a kilogram, each at the final mass of the flight before
+_SETTLED_MASS = 1e-4  # in ln(mass)
 _ERROR_SLACK = 0.05  # [m] landing error granted to the least-propellant step
 
 
@@ -154,6 +156,68 @@ def prove_infeasible(
     return prove_free_time(task)
 
 
+def _cheapest_anywhere(anywhere: ConvexTask) -> tuple[ConvexSolution | Plan, int]:
+    """The cheapest soft landing in the target's plane, or a plan that says there is none; solves it took."""
+    problem, cheapest = anywhere.problem, minimise_over_time(anywhere)
+    found, solves = cheapest.solution, cheapest.solves
+    if found is not None and found.log_mass_ratio <= problem.log_mass_ratio:
+        return found, solves
+    message = "no soft landing anywhere in the target's plane was found"
+    if found is not None:
+        message += f"; {_shortage(problem, found)}"
+    return Plan(PlanStatus.INFEASIBLE, problem, METHOD, message=message, solves=solves), solves
+
+
+def plan_weighed(
+    problem: LandingProblem,
+    nodes: int,
+    weight: float,
+    time_of_flight: float | None = None,
+    provisional: bool = False,
+) -> ConvexAnswer:
+    """Land softly in the target's plane with the least propellant + weight x landing error.
+
+    The propellant is not convex in ln(mass), so that a kilogram is priced at the final mass of the solution
+    before; that mass hardly changes.
+
+    Args:
+        problem: what to solve.
+        nodes: N.
+        weight: [kg/m] at least zero.
+        time_of_flight: [s] or None to search for the best.
+        provisional: whether a flight near the best time will do.
+
+    Returns:
+        A plan that is WEIGHED, or one without a flight, as `plan_convex` gives.
+    """
+    anywhere = ConvexTask(problem, nodes, free_landing_point=True)
+    if time_of_flight is not None:
+        cause = forbidden_by(problem, time_of_flight, free_landing_point=True)
+        if cause:
+            return ConvexAnswer(Plan(PlanStatus.INFEASIBLE, problem, METHOD, message=cause))
+        best, solves = anywhere.solve(time_of_flight), 1
+    else:
+        best, solves = _cheapest_anywhere(anywhere)
+        if isinstance(best, Plan):
+            return ConvexAnswer(best)
+    task, worth = anywhere, _worth_a_search(time_of_flight, provisional)
+    for _ in range(_MOST_PRICES):
+        if not best.solved:
+            break
+        before = best.log_mass_ratio
+        price = weight / problem.state.mass * math.exp(before)
+        task = replace(anywhere, limit_propellant=True, error_price=price)
+        if time_of_flight is not None:
+            found, more = task.solve(time_of_flight), 1
+        else:
+            outcome = minimise_over_time(task, LOG_MASS_TOLERANCE, best.time, coarse_first=False)
+            found, more = outcome.solution or task.solve(best.time), outcome.solves
+        best, solves = found, solves + more
+        if not best.solved or abs(best.log_mass_ratio - before) < _SETTLED_MASS:
+            break
+    return _finish(task, best, solves, PlanStatus.WEIGHED, worth)
+
+
 def plan_nearest(
     problem: LandingProblem, nodes: int, time_of_flight: float | None = None, provisional: bool = False
 ) -> Plan:
@@ -175,14 +239,9 @@ def plan_nearest(
         least = nearest.solve(time_of_flight)
         solves = 1
     else:
-        cheapest = minimise_over_time(anywhere)
-        solves = cheapest.solves
-        found = cheapest.solution
-        if found is None or found.log_mass_ratio > problem.log_mass_ratio:
-            message = "no soft landing anywhere in the target's plane was found"
-            if found is not None:
-                message += f"; {_shortage(problem, found)}"
-            return Plan(PlanStatus.INFEASIBLE, problem, METHOD, message=message, solves=solves)
+        found, solves = _cheapest_anywhere(anywhere)
+        if isinstance(found, Plan):
+            return found
         outcome = minimise_over_time(nearest, _ERROR_TOLERANCE, found.time)
         solves += outcome.solves
         least = outcome.solution or nearest.solve(found.time)

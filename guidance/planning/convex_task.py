@@ -32,6 +32,7 @@ class ConvexTask:
         free_landing_point: whether the landing point may move in the target's plane.
         least_error: whether to minimise the landing error in place of the propellant.
         error_limit: [m] greatest landing error; None for none.
+        error_price: [1/m] what a landing error costs beside the propellant, in ln(mass).
         limit_propellant: whether the dry mass bounds the flight (see `guidance.convex.scaling`).
         tolerance: of the conic solver.
         condense: whether to try the problem without its states first; False where the dual solution of the
@@ -46,6 +47,7 @@ class ConvexTask:
     limit_propellant: bool = False
     tolerance: float = 1e-8
     condense: bool = True
+    error_price: float = 0.0
 
     def solve(self, time: float, log_mass: Array | None = None) -> ConvexSolution:
         """One conic solve; thrust bounds linearised at `log_mass` (any length), or outward if None."""
@@ -66,7 +68,7 @@ class ConvexTask:
 
     def ask(self, template: ConvexTemplate, scaled: ScaledProblem) -> ConvexSolution:
         """Have one programme solved; a comparison of solvers puts another one here."""
-        return template.solve(scaled, self.least_error)
+        return template.solve(scaled, self.least_error, self.error_price)
 
     def refine(self, solution: ConvexSolution, reference: Array | None = None) -> tuple[ConvexSolution, int]:
         """Linearise anew until the true thrust bounds hold.

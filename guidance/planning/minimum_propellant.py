@@ -39,10 +39,10 @@ class _Search:
     def of(cls, task: ConvexTask) -> _Search:
         """The search for a task: J has a known shape, unless the flight ends with a velocity.
 
-        There it has kinks too where burns meet the nodes of a coarse mesh. In a frame that turns it is not
-        known either.
+        There it has kinks too where burns meet the nodes of a coarse mesh. In a frame that turns, or with a
+        price on the landing error, it is not known either.
         """
-        unknown = task.problem.target_velocity.any() or task.problem.rotates
+        unknown = task.problem.target_velocity.any() or task.problem.rotates or task.error_price > 0.0
         return cls(BracketSearch, 20.0) if unknown else cls(TimeSearch, 2.0)
 
 

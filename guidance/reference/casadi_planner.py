@@ -25,7 +25,12 @@ from guidance.descent.plan import Plan, PlanStatus
 from guidance.descent.problem import LandingProblem
 from guidance.descent.trajectory import Trajectory
 from guidance.flight_time.time_window import TimeWindow, forbidden_by, guess_time, time_window
-from guidance.reference.nonlinear_program import NonlinearSolver, Structure, nonlinear_program
+from guidance.reference.nonlinear_program import (
+    ERROR_SMOOTHING,
+    NonlinearSolver,
+    Structure,
+    nonlinear_program,
+)
 from guidance.reference.trajectory_guess import (
     is_vertical,
     least_energy_flight,
@@ -39,6 +44,7 @@ _SMOOTHING = 2e-5  # of full thrust; an engine that cannot stop needs none of it
 _LONG = 2e4  # [m] way beyond which the smoothing is finer
 _COARSE_SMOOTHING = 1e-2  # of full thrust, for a flight to start from
 _GREATEST_LEAST = 1.0 - 5e-4  # of full thrust: an interior-point method needs room between two bounds
+_NEAR_KINK = 10.0  # times the smoothing of the landing error
 _GREATEST_MIDWAY = 0.98  # of full thrust: an engine without throttle may turn by 23 degrees an interval
 
 
@@ -111,6 +117,7 @@ def plan_casadi(
     time_of_flight: float | None = None,
     guess: Plan | None = None,
     solver: NonlinearSolver | None = None,
+    landing_error_weight: float | None = None,
 ) -> Plan:
     """Least propellant to the target on the unrelaxed problem.
 
@@ -121,29 +128,53 @@ def plan_casadi(
         guess: an earlier plan to start from; None for the flight of least energy.
         solver: the only one to ask; None asks fatrop where it is reliable, IPOPT elsewhere and where fatrop
             fails.
+        landing_error_weight: [kg/m] price of a landing error beside the propellant; None lands at the target.
 
     Returns:
-        A plan that is OPTIMAL (a local optimum); or LIMIT_REACHED or SOLVER_FAILED, without a flight;
-        INFEASIBLE only where closed-form bounds leave no time of flight, or not the one asked for. Its
-        message names the solver, and what fatrop said where IPOPT took over; both count as solves.
+        A plan that is OPTIMAL, or WEIGHED where the landing error has a price (a local optimum); or
+        LIMIT_REACHED or SOLVER_FAILED, without a flight; INFEASIBLE only where closed-form bounds leave no
+        time of flight, or not the one asked for. Its message names the solver, and what fatrop said where
+        IPOPT took over; both count as solves.
     """
-    window = time_window(problem)
-    cause = window.cause if time_of_flight is None else forbidden_by(problem, time_of_flight)
+    weighed = landing_error_weight is not None
+    window = time_window(problem, weighed)
+    cause = window.cause if time_of_flight is None else forbidden_by(problem, time_of_flight, weighed)
     if cause:
         return Plan(PlanStatus.INFEASIBLE, problem, METHOD, message=cause)
-    structure = Structure.of(problem, nodes, time_of_flight is None)
+    structure = Structure.of(problem, nodes, time_of_flight is None, weighed)
     if guess is not None and guess.nodes:
         start = rest_of_flight(problem, guess.trajectory, nodes)
     else:
         start = least_energy_flight(problem, nodes, time_of_flight or guess_time(problem, window))
     times = window if time_of_flight is None else TimeWindow(time_of_flight, time_of_flight)
-    question = _Question(problem, structure, swing_sideways(problem, start), times)
+    question = _Question(
+        problem, structure, swing_sideways(problem, start), times, landing_error_weight or 0.0
+    )
     chosen = solver or structure.solver
     plan = question.answer(chosen)
+    if landing_error_weight is not None:
+        start_from = plan if plan.nodes else guess
+        return _at_target_if_cheaper(plan, nodes, start_from, time_of_flight, landing_error_weight)
     if plan.status.has_flight or solver is not None or chosen == "ipopt":
         return plan
     again = question.answer("ipopt")
     return replace(again, message=f"{again.message}; after {plan.message}", solves=plan.solves + again.solves)
+
+
+def _at_target_if_cheaper(
+    free: Plan, nodes: int, guess: Plan | None, time_of_flight: float | None, weight: float
+) -> Plan:
+    """The landing at the target itself, where the error has a kink that was smoothed; or the free one."""
+    problem = free.problem
+    if free.landing_error > _NEAR_KINK * ERROR_SMOOTHING * Units.of(problem).length:
+        return free
+    there = plan_casadi(problem, nodes, time_of_flight, guess)
+    solves = free.solves + there.solves
+    cost = free.propellant + weight * free.landing_error
+    if not there.status.has_flight or cost < there.propellant:
+        return replace(free, solves=solves)
+    message = f"{PlanStatus.WEIGHED.value}: at the target ({there.message})"
+    return replace(there, status=PlanStatus.WEIGHED, solves=solves, message=message)
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,6 +185,7 @@ class _Question:
     structure: Structure
     start: Trajectory
     times: TimeWindow
+    weight: float
 
     def answer(self, solver: NonlinearSolver) -> Plan:
         """Solve it by one solver.
@@ -180,6 +212,7 @@ class _Question:
         program = nonlinear_program(structure, solver)
         failed = Plan(PlanStatus.SOLVER_FAILED, problem, METHOD, solves=1)
         numbers = _parameters(problem, units, self.times, smoothing)
+        numbers["price"] = self.weight * units.length / problem.state.mass
         try:
             answer = program.solver(
                 x0=_pack(units, problem, self.start, structure.free_time),
@@ -196,5 +229,6 @@ class _Question:
             return replace(failed, status=status, message=f"{solver}: {stats['return_status']}")
         time = None if structure.free_time else self.times.low
         flight = _unpack(units, problem, np.array(answer["x"]).ravel(), structure.nodes, time)
-        plan = Plan.of_flight(PlanStatus.OPTIMAL, problem, METHOD, flight, solves=1)
+        ended = PlanStatus.WEIGHED if structure.free_landing else PlanStatus.OPTIMAL
+        plan = Plan.of_flight(ended, problem, METHOD, flight, solves=1)
         return replace(plan, message=f"{plan.message} ({solver})")

@@ -24,6 +24,8 @@ NonlinearSolver = Literal["fatrop", "ipopt"]
 _GREATEST_TURN = math.cos(math.radians(45.0))  # in one interval, for an engine that cannot stop
 _SERIES = 9  # second derivatives in the power series of an interval: exact to 1e-12 where it turns by 0.3 rad
 _GLIDE_SMOOTHING = 1e-6  # of the unit of length
+ERROR_SMOOTHING = 1e-3
+"""Of the unit of length: how far around the target the landing error is smoothed where it has a price."""
 _MOST_ITERATIONS: dict[NonlinearSolver, int] = {"fatrop": 200, "ipopt": 500}
 
 
@@ -49,6 +51,7 @@ class Structure:
         sight: whether the vehicle must stay within a cone from the target.
         rate: whether the change of the thrust is limited.
         rotates: whether the frame turns.
+        free_landing: whether the landing point is free in the target's plane, at a price.
     """
 
     nodes: int
@@ -61,9 +64,12 @@ class Structure:
     sight: bool
     rate: bool
     rotates: bool
+    free_landing: bool
 
     @classmethod
-    def of(cls, problem: LandingProblem, nodes: int, free_time: bool) -> Structure:
+    def of(
+        cls, problem: LandingProblem, nodes: int, free_time: bool, free_landing: bool = False
+    ) -> Structure:
         """That of `problem`."""
         lander = problem.lander
         return cls(
@@ -77,6 +83,7 @@ class Structure:
             problem.limits.line_of_sight is not None,
             problem.limits.thrust_rate is not None,
             problem.rotates,
+            free_landing,
         )
 
     @property
@@ -89,6 +96,7 @@ class Structure:
         """
         limited = self.min_thrust or self.pointing or self.glide_slope or self.speed
         limited = limited or self.final_thrust or self.sight or self.rate or self.rotates
+        limited = limited or self.free_landing
         return "ipopt" if limited or not fatrop_present() else "fatrop"
 
 
@@ -111,7 +119,7 @@ class _Stages:
         names = ("position", "velocity", "target_velocity", "gravity", "final_axis", "sight_axis", "spin")
         vectors = dict.fromkeys(names, 3)
         scalars = ("flow", "least_thrust", "least_midway", "dry", "smoothing", "pointing", "glide", "speed")
-        scalars += ("low", "high", "final_cosine", "sight_angle", "rate")
+        scalars += ("low", "high", "final_cosine", "sight_angle", "rate", "price")
         sizes = vectors | dict.fromkeys(scalars, 1)
         self.numbers = {name: ca.SX.sym(name, size) for name, size in sizes.items()}
         width = 11 if structure.free_time else 10
@@ -136,7 +144,8 @@ class _Stages:
             if self._structure.free_time:
                 self._add(self._ca.vertcat(x[10] - p["low"], p["high"] - x[10]))
         if k == last:
-            self._add(self._ca.vertcat(r, v - p["target_velocity"]), 0.0, 0.0)
+            place = r[2] if self._structure.free_landing else r
+            self._add(self._ca.vertcat(place, v - p["target_velocity"]), 0.0, 0.0)
             self._add(z - p["dry"])
         self._state_limits(k)
 
@@ -191,9 +200,10 @@ class _Stages:
         if self._structure.final_thrust and k == last:
             self._add(ca.dot(u, p["final_axis"]) - p["final_cosine"] * size)
         if self._structure.glide_slope and k < last:
-            across = self._size(r[:2], _GLIDE_SMOOTHING)
+            landing = self.states[last][:2] if self._structure.free_landing else 0.0
+            across = self._size(r[:2] - landing, _GLIDE_SMOOTHING)
             self._add(ca.sin(p["glide"]) * r[2] - ca.cos(p["glide"]) * across)
-        if self._structure.sight and k < last:
+        if self._structure.sight and (k < last or self._structure.free_landing):
             along = ca.dot(r, p["sight_axis"])
             across = self._size(r - along * p["sight_axis"], _GLIDE_SMOOTHING)
             self._add(ca.sin(p["sight_angle"]) * along - ca.cos(p["sight_angle"]) * across)
@@ -202,6 +212,14 @@ class _Stages:
 
     def _add(self, expression: Any, lower: float = 0.0, upper: float = math.inf) -> None:
         self.rows.append((expression, lower, upper))
+
+    @property
+    def cost(self) -> Any:
+        """Minus the log of the final mass; or the share of propellant, and the landing error at its price."""
+        last = self.states[-1]
+        if not self._structure.free_landing:
+            return -last[6]
+        return 1.0 - self._ca.exp(last[6]) + self.numbers["price"] * self._size(last[:2], ERROR_SMOOTHING)
 
     @property
     def decision(self) -> Any:
@@ -232,7 +250,7 @@ def nonlinear_program(structure: Structure, solver: NonlinearSolver) -> Nonlinea
     problem = {
         "x": stages.decision,
         "p": ca.vertcat(*stages.numbers.values()),
-        "f": -stages.states[-1][6],
+        "f": stages.cost,
         "g": ca.vertcat(*(part for part, _, _ in stages.rows)),
     }
     return NonlinearProgram(

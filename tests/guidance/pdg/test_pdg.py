@@ -187,6 +187,10 @@ def test_fixed_time_by_every_method(method):
         ({"nodes": 30.5}, "nodes"),
         ({"method": "magic"}, "auto, indirect, convex, casadi, cvxpy"),
         ({"unreachable": "give up"}, "unreachable"),
+        ({"landing_error_weight": -0.1}, "landing_error_weight"),
+        ({"landing_error_weight": math.inf}, "landing_error_weight"),
+        ({"landing_error_weight": 0.1, "method": "indirect"}, "landing_error_weight"),
+        ({"landing_error_weight": 0.1, "method": "cvxpy"}, "landing_error_weight"),
         ({"guess": [1, 2]}, "guess"),
     ],
 )
