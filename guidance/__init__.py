@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from guidance.bulk.answers import Descents
     from guidance.bulk.solve import solve_pdg_many
     from guidance.constants import MOON_GRAVITY, STANDARD_GRAVITY
+    from guidance.descent.limits import Cone, Limits
     from guidance.descent.plan import GuidanceError, InfeasibleError, Plan, PlanStatus, SolverFailedError
     from guidance.dynamics import propagate
     from guidance.lander import PAPER_LANDER, Lander
@@ -22,10 +23,12 @@ __all__ = [
     "MOON_GRAVITY",
     "PAPER_LANDER",
     "STANDARD_GRAVITY",
+    "Cone",
     "Descents",
     "GuidanceError",
     "InfeasibleError",
     "Lander",
+    "Limits",
     "Plan",
     "PlanStatus",
     "SolverFailedError",
@@ -44,10 +47,12 @@ __getattr__, __dir__ = lazy_exports(
         "MOON_GRAVITY": "guidance.constants",
         "PAPER_LANDER": "guidance.lander",
         "STANDARD_GRAVITY": "guidance.constants",
+        "Cone": "guidance.descent.limits",
         "Descents": "guidance.bulk.answers",
         "GuidanceError": "guidance.descent.plan",
         "InfeasibleError": "guidance.descent.plan",
         "Lander": "guidance.lander",
+        "Limits": "guidance.descent.limits",
         "Plan": "guidance.descent.plan",
         "PlanStatus": "guidance.descent.plan",
         "SolverFailedError": "guidance.descent.plan",

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from guidance.arrays import Array
+from guidance.descent.limits import Limits
 from guidance.descent.problem import LARGEST_NUMBER, ROUNDING, LandingProblem
 from guidance.lander import Lander
 from guidance.state import State
@@ -101,8 +102,7 @@ class Starts:
             self.targets[index],
             self.lander,
             self.gravity,
-            self.glide_slope_limit,
-            self.speed_limit,
+            Limits(glide_slope=self.glide_slope_limit, speed=self.speed_limit),
         )
 
 

@@ -18,6 +18,7 @@ from guidance.constants import MOON_GRAVITY
 from guidance.convex.clarabel_solver import ConicAnswer, ConicSolver
 from guidance.convex.constraints import Rows
 from guidance.convex.scaling import ScaledProblem, scale_problem
+from guidance.descent.limits import Cone, Limits
 from guidance.descent.problem import LandingProblem
 from guidance.lander import Lander
 from guidance.state import State
@@ -81,14 +82,21 @@ def cones_of(rows: list[Rows]) -> tuple[tuple[str, int], ...]:
 
 def nominal_numbers(nodes: int) -> ScaledProblem:
     """Numbers of the size that a descent has; only the solver's internal scaling depends on them."""
+    tilted = Cone(1.0, (0.1, -0.2, 1.0))
     problem = LandingProblem(
         State(np.array([200.0, 100.0, 900.0]), np.array([-8.0, -4.0, -30.0]), 1200.0),
         np.zeros(3),
         Lander(min_thrust=1000.0, pointing_limit=1.0),
         np.array(MOON_GRAVITY),
-        glide_slope_limit=1.0,
-        speed_limit=100.0,
+        Limits(
+            glide_slope=1.0,
+            speed=100.0,
+            final_thrust_direction=tilted,
+            line_of_sight=tilted,
+            thrust_rate=3000.0,
+        ),
         target_velocity=np.array([2.0, 1.0, -5.0]),
+        angular_velocity=np.array([1e-3, -2e-3, 3e-3]),
     )
     return scale_problem(problem, 30.0, nodes)
 

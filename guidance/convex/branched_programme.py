@@ -67,7 +67,8 @@ class Branching:
         parts = []
         for branch, numbers in enumerate(scaled):
             aim = origin - numbers.position  # this target as seen from the first
-            shared = replace(numbers, position=origin)
+            gravity = scaled[0].gravity  # at the first target, the origin of all
+            shared = replace(numbers, position=origin, sight_apex=aim, gravity=gravity)
             for family in self.constraint_set.families:
                 part = family(self.layout, shared)
                 if family is constraints.landing:

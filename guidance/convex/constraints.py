@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from guidance.arrays import Array, Index
 from guidance.convex.layout import Layout
-from guidance.convex.scaling import ScaledProblem
+from guidance.convex.scaling import RateBounds, ScaledProblem
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,6 +164,31 @@ def pointing(layout: Layout, scaled: ScaledProblem) -> Rows:
     return Rows("pointing", "nonnegative", n, bound=np.zeros(n), **entries)
 
 
+def final_thrust_direction(layout: Layout, scaled: ScaledProblem) -> Rows:
+    """Thrust acceleration along the axis >= cos(limit) * slack at the last node; convex as `pointing` is."""
+    column = np.append(layout.acceleration[-1], layout.slack[-1])
+    value = scaled.final_thrust * np.array([-1.0, -1.0, -1.0, 1.0])
+    row = np.zeros(4, dtype=np.int64)
+    return Rows("final thrust direction", "nonnegative", 1, row, column, value, np.zeros(1))
+
+
+def thrust_rate(layout: Layout, scaled: ScaledProblem) -> Rows:
+    """The thrust changes from node to node by no more than a step, in the form of `scaled.thrust_rate`."""
+    intervals = layout.nodes - 1
+    free = RateBounds(np.ones(layout.nodes), np.ones(intervals), np.zeros(intervals))
+    bounds = scaled.thrust_rate or free
+    row, push = np.arange(intervals * 4).reshape(-1, 4), layout.acceleration
+    entries = _stack(
+        (row[:, 1:], push[1:], np.repeat(-bounds.weight[1:], 3).reshape(-1, 3)),
+        (row[:, 1:], push[:-1], np.repeat(bounds.weight[:-1], 3).reshape(-1, 3)),
+        (row[:, 0], layout.slack[1:], -bounds.eased),
+    )
+    bound = np.zeros(row.shape)
+    bound[:, 0] = bounds.step
+    step, power = bound.ravel(), np.repeat([0.0, 1.0], [6 * intervals, intervals])
+    return Rows("thrust rate", "second_order", 4, bound=step, value_power=power, bound_rate=step, **entries)
+
+
 def glide_slope(layout: Layout, scaled: ScaledProblem) -> Rows:
     """Every node but the last lies in the upright cone above the landing point."""
     position = layout.position[:-1]
@@ -176,6 +201,16 @@ def glide_slope(layout: Layout, scaled: ScaledProblem) -> Rows:
         (row[:, 1:], landing_point, cosine),
     )
     return Rows("glide slope", "second_order", 3, bound=np.zeros(row.size), **entries)
+
+
+def line_of_sight(layout: Layout, scaled: ScaledProblem) -> Rows:
+    """Every node but the last lies in the cone about its axis from the target; a free landing point too."""
+    position = layout.position if layout.free_landing_point else layout.position[:-1]
+    row = np.arange(position.size).reshape(-1, 3)
+    rows, columns = np.broadcast_arrays(row[:, :, None], position[:, None, :])
+    entries = _stack((rows, columns, -scaled.sight))
+    bound = np.tile(-scaled.sight @ scaled.sight_apex, position.shape[0])
+    return Rows("line of sight", "second_order", 3, bound=bound, bound_rate=-2.0 * bound, **entries)
 
 
 def speed_limit(layout: Layout, scaled: ScaledProblem) -> Rows:

@@ -9,11 +9,12 @@ same numbers at every solve. In raw SI the solver says "Solved" and is a percent
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from guidance.arrays import Array
+from guidance.descent.limits import Cone
 from guidance.descent.problem import LandingProblem
 
 _LOOSE = 10.0  # scaled limit that binds no flight worth comparing
@@ -39,6 +40,23 @@ class MassBounds:
 
 
 @dataclass(frozen=True, eq=False)
+class RateBounds:
+    """Convex stand-in for |dT/dt| <= limit from node to node.
+
+        |weight[k + 1] u[k + 1] - weight[k] u[k]| <= step[k] + eased[k] s[k + 1]
+
+    Attributes:
+        weight: shape (N,); masses over the start mass, or ones.
+        step: shape (N - 1,).
+        eased: shape (N - 1,).
+    """
+
+    weight: Array
+    step: Array
+    eased: Array
+
+
+@dataclass(frozen=True, eq=False)
 class ScaledProblem:
     """A LandingProblem at one time of flight, in the units of the module docstring.
 
@@ -50,12 +68,18 @@ class ScaledProblem:
         position: start position from the target, shape (3,).
         velocity: start velocity, shape (3,).
         target_velocity: velocity at the landing point, shape (3,).
-        gravity: shape (3,).
+        gravity: at the target, shape (3,).
         mass_bounds: affine thrust bounds.
         propellant: greatest allowed -zeta at the end.
         pointing_cosine: cosine of the pointing limit; -1 for none.
         glide_angle: [rad] glide slope limit; pi/2 for none.
         speed_limit: greatest speed; 0 for none.
+        final_thrust: axis of the final thrust's cone and the cosine of its angle, shape (4,); zeros for none.
+        thrust_rate: bound on the change of the thrust.
+        sight: of the line of sight, rows sine of the angle times the axis, and cosine times two unit vectors
+            across, shape (3, 3); zeros for none.
+        sight_apex: where its cone stands, shape (3,).
+        rotation: [rad] of the frame during the flight, shape (3,).
         error_limit: greatest landing error where the landing point is free.
     """
 
@@ -72,6 +96,11 @@ class ScaledProblem:
     pointing_cosine: float = -1.0
     glide_angle: float = np.pi / 2
     speed_limit: float = 0.0
+    final_thrust: Array = field(default_factory=lambda: np.zeros(4))
+    thrust_rate: RateBounds | None = None
+    sight: Array = field(default_factory=lambda: np.zeros((3, 3)))
+    sight_apex: Array = field(default_factory=lambda: np.zeros(3))
+    rotation: Array = field(default_factory=lambda: np.zeros(3))
     error_limit: float = 0.0
 
     @property
@@ -83,14 +112,16 @@ class ScaledProblem:
     def unknown_bound(self) -> float:
         """Bound on every scaled unknown of any flight within the thrust bounds (for certificates).
 
-        All are reached from the start: the velocity at the end too, whatever is asked for.
+        All are reached from the start: the velocity at the end too, whatever is asked for. In a frame that
+        turns by an angle A the velocity against the stars, v + A x r, grows as it does in one at rest.
         """
+        turn, far = float(np.linalg.norm(self.rotation)), float(np.linalg.norm(self.position))
         gravity = float(np.linalg.norm(self.gravity))
         slack = float(
             np.max(self.mass_bounds.upper_bound + np.abs(self.mass_bounds.upper_slope) * self.propellant)
         )
-        speed = float(np.linalg.norm(self.velocity)) + gravity + slack
-        return 1.0 + float(np.linalg.norm(self.position)) + speed
+        speed = float(np.linalg.norm(self.velocity)) + turn * far + gravity + slack
+        return (1.0 + far + speed) * (1.0 + turn)
 
 
 def least_log_mass(problem: LandingProblem, time: float, nodes: int) -> Array:
@@ -131,6 +162,36 @@ def tangent_mass_bounds(problem: LandingProblem, log_mass: Array, kappa: float) 
     ratio = problem.lander.min_thrust / problem.lander.max_thrust
     bound = touch * (1.0 + log_mass)
     return MassBounds(touch * kappa, bound, ratio * touch * kappa, ratio * bound)
+
+
+def _axis_and_cosine(cone: Cone | None) -> Array:
+    return np.zeros(4) if cone is None else np.append(cone.direction, math.cos(cone.angle))
+
+
+def _cone_rows(cone: Cone | None) -> Array:
+    if cone is None:
+        return np.zeros((3, 3))
+    return np.vstack([math.sin(cone.angle) * cone.direction, math.cos(cone.angle) * cone.across])
+
+
+def rate_bounds(
+    problem: LandingProblem, time: float, nodes: int, log_mass: Array | None
+) -> RateBounds | None:
+    """Bounds on the change of the thrust from node to node; None without a limit.
+
+    With a reference ln(m / m_start) the thrust is its mass times the acceleration: what is wrong in the mass
+    is wrong in the rate. Without one no flight is excluded: m_k (u_{k+1} - u_k) is the change of the thrust
+    plus (m_k - m_{k+1}) u_{k+1}, where full thrust burns the most and the least mass is the lightest.
+    """
+    if problem.limits.thrust_rate is None:
+        return None
+    lander, intervals = problem.lander, nodes - 1
+    allowed = np.full(intervals, problem.limits.thrust_rate / lander.max_thrust * time / intervals)
+    if log_mass is not None:
+        return RateBounds(np.exp(log_mass), allowed, np.zeros(intervals))
+    lightest = np.exp(-least_log_mass(problem, time, nodes))
+    burnt = lander.max_mass_flow / problem.state.mass * time / intervals
+    return RateBounds(np.ones(nodes), lightest[:-1] * allowed, lightest[1:] * burnt)
 
 
 def scale_problem(
@@ -175,11 +236,15 @@ def scale_problem(
         position=problem.offset / length,
         velocity=problem.state.velocity / (acceleration * time),
         target_velocity=problem.target_velocity / (acceleration * time),
-        gravity=problem.gravity / acceleration,
+        gravity=problem.pull_at_target / acceleration,
         mass_bounds=bounds,
         propellant=min(problem.log_mass_ratio / kappa, loose) if limit_propellant else loose,
         pointing_cosine=-1.0 if limit is None else float(np.cos(limit)),
         glide_angle=np.pi / 2 if problem.glide_slope_limit is None else problem.glide_slope_limit,
         speed_limit=0.0 if speed is None else speed / (acceleration * time),
+        final_thrust=_axis_and_cosine(problem.limits.final_thrust_direction),
+        thrust_rate=rate_bounds(problem, time, nodes, log_mass),
+        sight=_cone_rows(problem.limits.line_of_sight),
+        rotation=problem.angular_velocity * time,
         error_limit=_LOOSE if error_limit is None else error_limit / length,
     )

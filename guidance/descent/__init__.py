@@ -12,6 +12,7 @@ from guidance.exports import lazy_exports
 if TYPE_CHECKING:
     from guidance.descent.certificate import Certificate, Proof
     from guidance.descent.dual_bound import DualBound, DualPiece
+    from guidance.descent.limits import NO_LIMITS, Cone, Limits
     from guidance.descent.plan import GuidanceError, InfeasibleError, Plan, PlanStatus, SolverFailedError
     from guidance.descent.problem import LandingProblem
     from guidance.descent.residuals import FLIGHT_TOLERANCE, FlightTolerance, Residuals
@@ -25,6 +26,11 @@ _HOMES = {
     "guidance.descent.dual_bound": (
         "DualBound",
         "DualPiece",
+    ),
+    "guidance.descent.limits": (
+        "NO_LIMITS",
+        "Cone",
+        "Limits",
     ),
     "guidance.descent.plan": (
         "GuidanceError",
@@ -44,13 +50,16 @@ _HOMES = {
 
 __all__ = [
     "FLIGHT_TOLERANCE",
+    "NO_LIMITS",
     "Certificate",
+    "Cone",
     "DualBound",
     "DualPiece",
     "FlightTolerance",
     "GuidanceError",
     "InfeasibleError",
     "LandingProblem",
+    "Limits",
     "Plan",
     "PlanStatus",
     "Proof",

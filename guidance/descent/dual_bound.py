@@ -102,6 +102,8 @@ class DualBound:
         marks = [self.shortest, *(piece.end for piece in self.pieces)]
         numbers = [self.bound, self.spent_at_most, *marks[:-1]]
         numbers += [float(number) for piece in self.pieces for number in piece.primer]
+        if self.problem.rotates:  # the relaxation knows no turning frame
+            return False
         if not self.pieces or not all(math.isfinite(number) for number in numbers):
             return False
         chained = marks[:-1] == [piece.begin for piece in self.pieces] and marks[-1] == self.longest

@@ -14,6 +14,7 @@ from guidance.arrays import Array
 from guidance.descent.certificate import Certificate
 from guidance.descent.problem import LandingProblem
 from guidance.descent.residuals import Residuals, fly_residuals
+from guidance.descent.rotating_frame import rotating_states_at
 from guidance.descent.trajectory import Trajectory, no_trajectory
 
 
@@ -128,9 +129,9 @@ class Plan:
     def optimality_gap(self) -> float:
         """[kg] what the plan burns above the proved lower bound; nan without a flight or a bound.
 
-        The bound uses the altitude and the glide slope at one time of each flight, and leaves out the speed
-        limit: where these bind for longer, the gap holds a part of their price too. `certificate.scope` says
-        which times of flight it covers.
+        The bound uses the altitude and the glide slope at one time of each flight, and leaves out the other
+        `limits` of the problem: where these, or those for longer, bind, the gap holds a part of their price
+        too. `certificate.scope` says which times of flight it covers.
         """
         if self.status is not PlanStatus.OPTIMAL or self.certificate is None:
             return float("nan")
@@ -164,7 +165,10 @@ class Plan:
             ValueError: the plan holds no flight.
         """
         self._demand_flight("has no states")
-        return self.trajectory.states_at(np.asarray(time, dtype=np.float64), self.problem.gravity)
+        times = np.asarray(time, dtype=np.float64)
+        if self.problem.rotates:
+            return rotating_states_at(self.trajectory, times, self.problem)
+        return self.trajectory.states_at(times, self.problem.gravity)
 
     @cached_property
     def residuals(self) -> Residuals:

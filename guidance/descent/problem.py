@@ -8,14 +8,18 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from guidance.arrays import Array
+from guidance.descent.limits import NO_LIMITS, Limits
 from guidance.lander import Lander
 from guidance.state import State
-from guidance.validation import finite_number, finite_vector
+from guidance.validation import finite_vector
 
 LARGEST_NUMBER = 1e9
 """No distance, speed or mass of a powered descent is larger; far beyond it, their powers overflow."""
 ROUNDING = 1e-6
 """What rounding may take from a limit: of the distance to the target or 1 m, of the speed or 1 m/s."""
+
+
+_VECTORS = ("target", "gravity", "target_velocity", "angular_velocity")
 
 
 def lies_below(start: Array, target: Array) -> bool:
@@ -28,17 +32,19 @@ def lies_below(start: Array, target: Array) -> bool:
 class LandingProblem:
     """From `state` to `target` with the least propellant, never below the target's altitude.
 
-    A start that breaks the altitude, the glide slope or the speed limit by no more than `ROUNDING` keeps it.
+    A start that breaks the altitude, the glide slope, the line of sight or the speed limit by no more than
+    `ROUNDING` keeps it.
 
     Attributes:
         state: where the flight starts; its mass includes the propellant.
         target: [m] shape (3,), site frame.
         lander: the vehicle; its pointing limit is measured from the z axis.
-        gravity: [m/s^2] shape (3,), constant.
-        glide_slope_limit: [rad] greatest angle, seen from the landing point, between the vehicle and the z
-            axis, in (0, pi/2]; None for none.
-        speed_limit: [m/s] greatest speed; None for none.
+        gravity: [m/s^2] shape (3,), constant in the site frame.
+        limits: what the path has to keep.
         target_velocity: [m/s] shape (3,), at the target; rest unless given.
+        angular_velocity: [rad/s] shape (3,), of the site frame, about an axis through its origin: Coriolis
+            and centrifugal acceleration act beside gravity, which is the pull at the origin. Zero unless
+            given.
 
     Raises:
         ValueError: an argument is out of range or not finite, the start lies below the target's altitude by
@@ -49,19 +55,21 @@ class LandingProblem:
     target: Array
     lander: Lander
     gravity: Array
-    glide_slope_limit: float | None = None
-    speed_limit: float | None = None
+    limits: Limits = NO_LIMITS
     target_velocity: Array = field(default_factory=lambda: np.zeros(3))
+    angular_velocity: Array = field(default_factory=lambda: np.zeros(3))
 
     def __post_init__(self) -> None:
         """Refuse what no solver should see."""
-        for name in ("target", "gravity", "target_velocity"):
+        for name in _VECTORS:
             vector = finite_vector(name, getattr(self, name), 3)
             vector.flags.writeable = False
             object.__setattr__(self, name, vector)
         if not isinstance(self.lander, Lander):
             raise ValueError(f"lander must be a Lander, got {self.lander!r}")
-        numbers = {name: getattr(self, name) for name in ("target", "gravity", "target_velocity")}
+        if not isinstance(self.limits, Limits):
+            raise ValueError(f"limits must be a Limits, got {self.limits!r}")
+        numbers = {name: getattr(self, name) for name in _VECTORS}
         for name, vector in ({"state": self.state.as_array()} | numbers).items():
             if np.abs(vector).max() > LARGEST_NUMBER:
                 raise ValueError(f"{name}: no number may exceed {LARGEST_NUMBER:g}, got {vector.tolist()}")
@@ -74,10 +82,16 @@ class LandingProblem:
                 f"state: start altitude {self.state.position[2]:g} m lies below the target's, "
                 f"{self.target[2]:g} m"
             )
-        if self.glide_slope_limit is not None:
-            finite_number("glide_slope_limit", self.glide_slope_limit, above=0.0, at_most=math.pi / 2)
-        if self.speed_limit is not None:
-            finite_number("speed_limit", self.speed_limit, above=0.0)
+
+    @property
+    def glide_slope_limit(self) -> float | None:
+        """[rad] that of the limits."""
+        return self.limits.glide_slope
+
+    @property
+    def speed_limit(self) -> float | None:
+        """[m/s] that of the limits."""
+        return self.limits.speed
 
     @property
     def has_glide_slope(self) -> bool:
@@ -88,16 +102,21 @@ class LandingProblem:
     def offset(self) -> Array:
         """[m] shape (3,): the start as seen from the target.
 
-        One that breaks the altitude or the glide slope by no more than rounding is moved to keep it.
+        One that breaks the altitude, the glide slope or the line of sight by no more than rounding is moved
+        to keep it.
         """
         offset = self.state.position - self.target
         if offset[2] < 0.0:
             offset[2] = 0.0
         outside = self.outside_glide_slope(offset)
-        if 0.0 < outside <= ROUNDING * max(1.0, float(np.linalg.norm(offset))):
+        rounding = ROUNDING * max(1.0, float(np.linalg.norm(offset)))
+        if 0.0 < outside <= rounding:
             across, angle = math.hypot(offset[0], offset[1]), self.glide_slope_limit or 0.0
             offset[:2] *= 1.0 - outside * math.cos(angle) / across
             offset[2] += outside * math.sin(angle)
+        sight = self.limits.line_of_sight
+        if sight is not None and 0.0 < sight.outside(offset) <= rounding:
+            offset = sight.on_surface(offset)
         return offset
 
     def outside_glide_slope(self, vector: Array) -> float:
@@ -106,6 +125,17 @@ class LandingProblem:
             return 0.0
         angle, across = self.glide_slope_limit, math.hypot(vector[0], vector[1])
         return math.cos(angle) * across - math.sin(angle) * float(vector[2])
+
+    @property
+    def rotates(self) -> bool:
+        """Whether the site frame turns."""
+        return bool(self.angular_velocity.any())
+
+    @property
+    def pull_at_target(self) -> Array:
+        """[m/s^2] shape (3,): gravity and the centrifugal acceleration at the target."""
+        spin = self.angular_velocity
+        return self.gravity - np.cross(spin, np.cross(spin, self.target))
 
     @property
     def arrived(self) -> bool:

@@ -14,12 +14,13 @@ import numpy as np
 
 from guidance.arrays import Array
 from guidance.constants import MOON_GRAVITY
+from guidance.descent.flown_path import BETWEEN, distance_between, fly_thrust, length_of
+from guidance.descent.limits import Cone
 from guidance.descent.problem import LandingProblem
 from guidance.descent.trajectory import Trajectory
 from guidance.kernel import compile_kernel
 
 _ALIGNED = 0.9999  # cosine of the change of direction over an interval whose thrust keeps it
-_BETWEEN = 4  # Runge-Kutta steps per interval, in which the thrust is smooth; each is a sample of the path
 
 
 @dataclass(frozen=True)
@@ -30,12 +31,13 @@ class FlightTolerance:
     lengths and speeds are for the Moon and below, and grow with gravity above.
 
     Attributes:
-        position: [m] of `position` and `glide_slope`.
+        position: [m] of `position`, `glide_slope` and `line_of_sight`.
         velocity: [m/s] of `velocity` and `speed`.
         altitude: [m].
         thrust: of `thrust_above` and `thrust_below`, relative to max_thrust and min_thrust.
         thrust_dip: of `thrust_dip`, relative to min_thrust.
-        pointing: [rad].
+        thrust_rate: of `thrust_rate`, relative to the limit.
+        pointing: [rad] of `pointing` and `final_thrust_direction`.
         propellant: [kg].
     """
 
@@ -44,6 +46,7 @@ class FlightTolerance:
     altitude: float = 0.2
     thrust: float = 1e-3
     thrust_dip: float = 0.04
+    thrust_rate: float = 0.01
     pointing: float = 1e-3
     propellant: float = 1e-3
 
@@ -60,8 +63,11 @@ RESIDUAL_UNITS = {
     "thrust_above": "N",
     "thrust_below": "N",
     "thrust_dip": "N",
+    "thrust_rate": "N/s",
     "pointing": "rad",
+    "final_thrust_direction": "rad",
     "glide_slope": "m",
+    "line_of_sight": "m",
     "altitude": "m",
     "speed": "m/s",
     "propellant": "kg",
@@ -83,8 +89,11 @@ class Residuals:
         thrust_above: [N] greatest excess over max_thrust, at nodes and between.
         thrust_below: [N] greatest lack below min_thrust at nodes.
         thrust_dip: [N] the same between nodes, where a change of direction makes the thrust dip.
+        thrust_rate: [N/s] greatest excess of the thrust's change per second over its limit.
         pointing: [rad] greatest excess over the pointing limit at nodes.
+        final_thrust_direction: [rad] excess over that limit at the last node.
         glide_slope: [m] greatest horizontal distance outside the glide slope cone, flown, at nodes.
+        line_of_sight: [m] greatest distance outside that cone, flown, at nodes.
         altitude: [m] greatest depth below the target's altitude, or below a start that rounding puts beneath
             it, flown, at nodes and between.
         speed: [m/s] greatest excess over the speed limit, flown, at nodes.
@@ -101,8 +110,11 @@ class Residuals:
     thrust_above: float
     thrust_below: float
     thrust_dip: float
+    thrust_rate: float
     pointing: float
+    final_thrust_direction: float
     glide_slope: float
+    line_of_sight: float
     altitude: float
     speed: float
     propellant: float
@@ -122,8 +134,11 @@ class Residuals:
             "thrust_above": tolerance.thrust * lander.max_thrust,
             "thrust_below": max(tolerance.thrust * lander.min_thrust, 1e-9),
             "thrust_dip": max(tolerance.thrust_dip * lander.min_thrust, 1e-9),
+            "thrust_rate": tolerance.thrust_rate * (problem.limits.thrust_rate or math.inf),
             "pointing": tolerance.pointing,
+            "final_thrust_direction": tolerance.pointing,
             "glide_slope": tolerance.position * unit,
+            "line_of_sight": tolerance.position * unit,
             "altitude": tolerance.altitude * unit,
             "speed": tolerance.velocity * unit,
             "propellant": tolerance.propellant,
@@ -133,52 +148,6 @@ class Residuals:
     def keeps_limits(self, problem: LandingProblem) -> bool:
         """Whether the flown plan lands where it says and keeps every limit of `problem`, to the tolerance."""
         return max(self.excess(problem).values()) <= 1.0
-
-
-@compile_kernel
-def _length(x: float, y: float, z: float) -> float:
-    return math.sqrt(x * x + y * y + z * z)
-
-
-@compile_kernel
-def _distance(first: Array, second: Array) -> float:
-    return _length(first[0] - second[0], first[1] - second[1], first[2] - second[2])
-
-
-@compile_kernel
-def _fly(start: Array, steps: Array, thrust: Array, gravity: Array, exhaust_velocity: float) -> Array:
-    """Flown states, shape ((N - 1) * _BETWEEN + 1, 7), by the classical Runge-Kutta method.
-
-    Args:
-        start: state, shape (7,).
-        steps: [s] shape (N - 1,).
-        thrust: [N] shape (N - 1, 2 * _BETWEEN + 1, 3).
-        gravity: [m/s^2] shape (3,).
-        exhaust_velocity: [m/s].
-    """
-    out = np.empty((steps.size * _BETWEEN + 1, 7))
-    rate, total, here = np.empty(7), np.empty(7), np.empty(7)
-    out[0] = start
-    for k in range(steps.size):
-        dt = steps[k] / _BETWEEN
-        for part in range(_BETWEEN):
-            state = out[k * _BETWEEN + part]
-            here[:] = state
-            total[:] = 0.0
-            for stage in range(4):
-                force = thrust[k, 2 * part + (stage + 1) // 2]
-                for axis in range(3):
-                    rate[axis] = here[3 + axis]
-                    rate[3 + axis] = force[axis] / here[6] + gravity[axis]
-                rate[6] = -_length(force[0], force[1], force[2]) / exhaust_velocity
-                ahead = dt if stage == 2 else 0.5 * dt
-                weight = 2.0 if stage in (1, 2) else 1.0
-                for number in range(7):
-                    total[number] += weight * rate[number]
-                    here[number] = state[number] + ahead * rate[number]
-            for number in range(7):
-                out[k * _BETWEEN + part + 1, number] = state[number] + dt / 6.0 * total[number]
-    return out
 
 
 class _Departures(NamedTuple):
@@ -203,29 +172,29 @@ def _measure(
     """Compare flown states with the plan.
 
     Args:
-        fine: what `_fly` gives.
-        thrust: [N] shape (N - 1, 2 * _BETWEEN + 1, 3).
+        fine: what `fly_thrust` gives.
+        thrust: [N] shape (N - 1, 2 * BETWEEN + 1, 3).
         trajectory: time, position, velocity and mass at the nodes.
         exhaust_velocity: [m/s].
     """
     time, position, velocity, mass = trajectory
     far, fast, heavy, last, speed = 0.0, 0.0, 0.0, 0.0, 0.0
     for k in range(time.size):
-        flown = fine[k * _BETWEEN]
-        last = _distance(flown[:3], position[k])
-        far, fast = max(far, last), max(fast, _distance(flown[3:6], velocity[k]))
+        flown = fine[k * BETWEEN]
+        last = distance_between(flown[:3], position[k])
+        far, fast = max(far, last), max(fast, distance_between(flown[3:6], velocity[k]))
         heavy = max(heavy, abs(flown[6] - mass[k]))
-        speed = max(speed, _length(flown[3], flown[4], flown[5]))
+        speed = max(speed, length_of(flown[3], flown[4], flown[5]))
     lowest = np.inf
     for k in range(fine.shape[0]):
         lowest = min(lowest, fine[k, 2])
     greatest, least, between, gap = 0.0, np.inf, np.inf, 0.0
     for k in range(time.size - 1):
         for part in range(thrust.shape[1]):
-            size = _length(thrust[k, part, 0], thrust[k, part, 1], thrust[k, part, 2])
+            size = length_of(thrust[k, part, 0], thrust[k, part, 1], thrust[k, part, 2])
             greatest, between = max(greatest, size), min(between, size)
         first, second = thrust[k, 0], thrust[k, -1]
-        before, after = _length(first[0], first[1], first[2]), _length(second[0], second[1], second[2])
+        before, after = length_of(first[0], first[1], first[2]), length_of(second[0], second[1], second[2])
         least = min(least, before, after)
         along = first[0] * second[0] + first[1] * second[1] + first[2] * second[2]
         if along > _ALIGNED * before * after:
@@ -234,29 +203,46 @@ def _measure(
     return _Departures(far, fast, heavy, last, greatest, least, between, lowest, speed, gap)
 
 
-def fly_trajectory(trajectory: Trajectory, problem: LandingProblem) -> Array:
-    """Flown states, shape (4 (N - 1) + 1, 7): at the nodes and three times between each two.
-
-    Position [m], velocity [m/s], mass [kg]. The integration errs by less than a millimetre.
-    """
-    return _fly_thrust(trajectory, trajectory.sample_thrust(2 * _BETWEEN), problem)
-
-
-def _fly_thrust(trajectory: Trajectory, thrust: Array, problem: LandingProblem) -> Array:
-    time, exhaust = trajectory.time, trajectory.exhaust_velocity
-    return _fly(problem.state.as_array(), time[1:] - time[:-1], thrust, problem.gravity, exhaust)
-
-
 def pointing_excess(thrust: Array, limit: float | None, max_thrust: float) -> float:
     """[rad] by how much thrusts, shape (N, 3) in any unit, lean beyond a limit; next to none has no lean."""
     if limit is None:
         return 0.0
     size = np.linalg.norm(thrust, axis=1)
-    burning = size > 1e-3 * max(float(size.max()), 1e-3 * max_thrust)  # what a solver leaves of zero is none
+    burning = size > _least_burning(size, max_thrust)
     if not burning.any():
         return 0.0
     angle = np.arctan2(np.linalg.norm(thrust[burning, :2], axis=1), thrust[burning, 2])
     return max(0.0, float(angle.max()) - limit)
+
+
+def final_thrust_excess(thrust: Array, problem: LandingProblem, max_thrust: float | None = None) -> float:
+    """[rad] by how much the last of thrusts, shape (N, 3), leaves its cone; none has no direction.
+
+    Args:
+        thrust: in any unit.
+        problem: what is asked.
+        max_thrust: greatest thrust in that unit; that of the lander in newtons unless given.
+    """
+    cone, size = problem.limits.final_thrust_direction, np.linalg.norm(thrust, axis=1)
+    most = problem.lander.max_thrust if max_thrust is None else max_thrust
+    if cone is None or size[-1] <= _least_burning(size, most):
+        return 0.0
+    return cone.excess(thrust[-1])
+
+
+def _least_burning(size: Array, max_thrust: float) -> float:
+    """What a solver leaves of no thrust, among thrusts of some sizes."""
+    return 1e-3 * max(float(size.max()), 1e-3 * max_thrust)
+
+
+def _rate_excess(thrust: Array, time: Array, limit: float | None) -> float:
+    """[N/s] of thrusts sampled within intervals; a jump between two of them counts as one sample's change."""
+    if limit is None:
+        return 0.0
+    part = np.diff(time) / (thrust.shape[1] - 1)
+    within = np.linalg.norm(np.diff(thrust, axis=1), axis=2) / part[:, None]
+    jumps = np.linalg.norm(thrust[1:, 0] - thrust[:-1, -1], axis=1) / part[1:]
+    return max(0.0, float(within.max()) - limit, float(jumps.max()) - limit)
 
 
 def _glide_excess(offset: Array, limit: float | None) -> float:
@@ -266,6 +252,10 @@ def _glide_excess(offset: Array, limit: float | None) -> float:
     return max(0.0, float(outside.max()))
 
 
+def _sight_excess(offset: Array, cone: Cone | None) -> float:
+    return 0.0 if cone is None else max(0.0, float(cone.outside(offset).max()))
+
+
 def fly_residuals(trajectory: Trajectory, problem: LandingProblem) -> Residuals:
     """Fly a plan's trajectory and measure it.
 
@@ -273,8 +263,8 @@ def fly_residuals(trajectory: Trajectory, problem: LandingProblem) -> Residuals:
         trajectory: a flight from the problem's start.
         problem: its limits.
     """
-    thrust = trajectory.sample_thrust(2 * _BETWEEN)
-    fine = _fly_thrust(trajectory, thrust, problem)
+    thrust = trajectory.sample_thrust(2 * BETWEEN)
+    fine = fly_thrust(trajectory, thrust, problem)
     lander, end = problem.lander, fine[-1]
     nodes = trajectory.time, trajectory.position, trajectory.velocity, trajectory.mass
     found = _measure(fine, thrust, nodes, trajectory.exhaust_velocity)
@@ -289,8 +279,11 @@ def fly_residuals(trajectory: Trajectory, problem: LandingProblem) -> Residuals:
         thrust_above=max(0.0, found.greatest_thrust - lander.max_thrust),
         thrust_below=max(0.0, lander.min_thrust - found.least_thrust),
         thrust_dip=max(0.0, lander.min_thrust - found.least_between),
+        thrust_rate=_rate_excess(thrust, trajectory.time, problem.limits.thrust_rate),
         pointing=pointing_excess(trajectory.thrust, lander.pointing_limit, lander.max_thrust),
-        glide_slope=_glide_excess(fine[::_BETWEEN, :3] - end[:3], problem.glide_slope_limit),
+        final_thrust_direction=final_thrust_excess(trajectory.thrust, problem),
+        glide_slope=_glide_excess(fine[::BETWEEN, :3] - end[:3], problem.glide_slope_limit),
+        line_of_sight=_sight_excess(fine[::BETWEEN, :3] - problem.target, problem.limits.line_of_sight),
         altitude=max(0.0, floor - found.lowest),
         speed=max(0.0, found.speed - limit),
         propellant=max(0.0, lander.dry_mass - float(end[6])),

@@ -80,6 +80,8 @@ def find_ground_contact(problem: LandingProblem) -> GroundContact | None:
     """Where a start that is too fast to stop meets the target's altitude; None where it can stop above it."""
     lander, mass = problem.lander, problem.state.mass
     gravity, rate = float(problem.gravity[2]), float(problem.state.velocity[2])
+    if problem.rotates:  # what pulls at it is not gravity alone
+        return None
     if not -rate > problem.speed_rounding or lander.max_thrust / mass + gravity <= 0.0:
         return None
     tau = mass / lander.max_mass_flow

@@ -69,11 +69,14 @@ def find_primer_flight(problem: LandingProblem, time: float | None = None) -> Pr
 
     Returns:
         The flight; None where none was found, where the engine cannot stop or cannot lift the vehicle, where
-        the flight does not end at rest, where gravity vanishes, where no coast is left between the burns, or
-        where the flight breaks a limit of the problem: the method knows none.
+        the flight does not end at rest, where the frame turns, where the thrust may not jump, where gravity
+        vanishes, where no coast is left between the burns, or where the flight breaks a limit of the
+        problem: the method knows none.
     """
     lander, mass = problem.lander, problem.state.mass
-    if lander.min_thrust > 0.0 or problem.target_velocity.any():
+    if lander.min_thrust > 0.0 or problem.target_velocity.any() or problem.rotates:
+        return None
+    if problem.limits.thrust_rate is not None:
         return None
     unit = lander.max_thrust / mass
     scaled = PrimerProblem(
@@ -104,6 +107,12 @@ def _keeps_limits(problem: LandingProblem, path: PrimerPath, unit: float) -> boo
         if path.direction[burning, 2].min() < math.cos(limit):
             return False
     if speed is not None and (path.velocity**2).sum(axis=1).max() > (speed / unit) ** 2:
+        return False
+    final = problem.limits.final_thrust_direction
+    if final is not None and final.excess(path.direction[-1]) > 0.0:
+        return False
+    sight = problem.limits.line_of_sight
+    if sight is not None and sight.outside(position).max() > 0.0:
         return False
     across = np.hypot(position[:, 0], position[:, 1])
     return glide is None or bool((across * math.cos(glide) <= height * math.sin(glide)).all())

@@ -106,6 +106,11 @@ def _broken_at_ends(problem: LandingProblem, free_landing_point: bool) -> str:
     distance = float(np.linalg.norm(problem.offset))
     if outside > ROUNDING * max(1.0, distance) or problem.outside_glide_slope(-w) > still:
         return "glide slope"
+    sight = problem.limits.line_of_sight
+    if sight is not None:
+        leaves = not free_landing_point and sight.outside(-w) > still
+        if leaves or sight.outside(problem.offset) > ROUNDING * max(1.0, distance):
+            return "line of sight"
     arrival = min(0.0, float(w[2]))
     return _too_fast(problem) if _speed_at_contact_squared(problem) > arrival * arrival else ""
 
@@ -122,6 +127,8 @@ def _too_fast(problem: LandingProblem) -> str:
 
 def _speed_at_contact_squared(problem: LandingProblem) -> float:
     """[m^2/s^2] least squared speed of sink at the target's altitude; not above zero where it can stop."""
+    if problem.rotates:  # what pulls at it is not gravity alone
+        return 0.0
     contact = find_ground_contact(problem)
     if contact is not None:
         return contact.sink**2
@@ -162,7 +169,8 @@ def time_window(problem: LandingProblem, free_landing_point: bool = False) -> Ti
     """Closed-form bounds on the time of flight.
 
     Where nothing bounds it from above (no gravity, no least thrust) the window ends at a hundred times the
-    time that the engine needs to stop and to cross the distance.
+    time that the engine needs to stop and to cross the distance. In a frame that turns these are no bounds
+    on the time but where to look for it; what the two ends forbid by themselves is forbidden there too.
 
     Args:
         problem: the landing problem.
@@ -188,6 +196,9 @@ def time_window(problem: LandingProblem, free_landing_point: bool = False) -> Ti
     limits = _necessary(problem, free_landing_point)
     low, contact = 1e-3 * engine_time, _latest_contact(problem)
     window = _hull(limits["maximum thrust"] + limits["propellant"], low, min(high, contact))
+    if problem.rotates:
+        around = TimeWindow(0.5 * window.low, 2.0 * window.high)
+        return TimeWindow(low, high) if window.empty else around
     if not window.empty:
         return window
     if contact < high and not _hull(limits["maximum thrust"] + limits["propellant"], low, high).empty:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Literal
 
 from guidance.console import tolerate_encoding
+from guidance.descent.limits import Cone, Limits
 from guidance.descent.plan import GuidanceError, Plan
 from guidance.descent.residuals import RESIDUAL_UNITS
 from guidance.lander import Lander
@@ -28,10 +29,16 @@ class PdgCommand:
         min_thrust: Least thrust [N].
         specific_impulse: [s], referred to 9.80665 m/s^2.
         gravity: Gravity x y z [m/s^2].
+        angular_velocity: Angular velocity x y z of the site [rad/s].
         pointing_limit_deg: Greatest angle of thrust from the vertical [deg].
         glide_slope_limit_deg: Greatest angle of the vehicle from the vertical, seen from the landing point
             [deg].
         speed_limit: Greatest speed [m/s].
+        final_thrust_limit_deg: Greatest angle of the last thrust from its axis [deg].
+        final_thrust_axis: That axis x y z.
+        line_of_sight_limit_deg: Greatest angle of the vehicle from an axis, seen from the target [deg].
+        line_of_sight_axis: That axis x y z.
+        thrust_rate_limit: Greatest change of the thrust vector [N/s].
         time_of_flight: [s]; searched for unless given.
         nodes: Nodes of the plan.
         method: auto takes indirect where no limit binds, else convex; cvxpy and casadi are independent
@@ -48,18 +55,36 @@ class PdgCommand:
     min_thrust: float = 0.0
     specific_impulse: float = 325.0
     gravity: tuple[float, float, float] = (0.0, 0.0, -1.62)
+    angular_velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
     pointing_limit_deg: float | None = None
     glide_slope_limit_deg: float | None = None
     speed_limit: float | None = None
+    final_thrust_limit_deg: float | None = None
+    final_thrust_axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    line_of_sight_limit_deg: float | None = None
+    line_of_sight_axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    thrust_rate_limit: float | None = None
     time_of_flight: float | None = None
     nodes: int = DEFAULT_NODES
     method: PlanningMethod = "auto"
     unreachable: Literal["raise", "nearest"] = "raise"
     plot: Path | None = None
 
+    @property
+    def limits(self) -> Limits:
+        """What the path has to keep."""
+        glide = self.glide_slope_limit_deg
+        return Limits(
+            glide_slope=None if glide is None else math.radians(glide),
+            speed=self.speed_limit,
+            final_thrust_direction=_cone(self.final_thrust_limit_deg, self.final_thrust_axis),
+            line_of_sight=_cone(self.line_of_sight_limit_deg, self.line_of_sight_axis),
+            thrust_rate=self.thrust_rate_limit,
+        )
+
     def solve(self) -> Plan:
         """The plan that the command asks for; raises what `solve_pdg` raises."""
-        pointing, glide = self.pointing_limit_deg, self.glide_slope_limit_deg
+        pointing = self.pointing_limit_deg
         lander = Lander(
             dry_mass=self.dry_mass,
             max_thrust=self.max_thrust,
@@ -72,14 +97,18 @@ class PdgCommand:
             self.target,
             lander=lander,
             gravity=self.gravity,
-            glide_slope_limit=None if glide is None else math.radians(glide),
-            speed_limit=self.speed_limit,
+            angular_velocity=self.angular_velocity,
+            limits=self.limits,
             time_of_flight=self.time_of_flight,
             nodes=self.nodes,
             method=self.method,
             unreachable=self.unreachable,
             target_velocity=self.target_velocity,
         )
+
+
+def _cone(angle_deg: float | None, axis: tuple[float, float, float]) -> Cone | None:
+    return None if angle_deg is None else Cone(math.radians(angle_deg), axis)
 
 
 def describe(plan: Plan) -> str:

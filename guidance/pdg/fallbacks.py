@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 MOST_NODES = 1000
 """A plan that does not keep its limits on so many nodes is none."""
 
-_CURED_BY_NODES = ("position", "velocity", "altitude", "glide_slope", "speed", "thrust_above", "thrust_dip")
+_NOT_CURED_BY_NODES = ("thrust_below", "pointing", "final_thrust_direction", "propellant")
 _OUT_OF_REACH = "the thrust and the propellant on board do not suffice for any flight to the target"
 _LOCAL_GAP = 2e-3  # of propellant, over the relaxed flight's: not worth another guess
 
@@ -66,7 +66,7 @@ class Request:
     @property
     def bounds_first(self) -> bool:
         """Whether the dual bound is asked before any search."""
-        return self.time_of_flight is None and self.method in ("auto", "convex")
+        return self.time_of_flight is None and self.method in ("auto", "convex") and not self.problem.rotates
 
     def finer(self, nodes: int, found: Plan) -> Request:
         """The same on more nodes, from the plan found so far."""
@@ -105,7 +105,7 @@ def answer(request: Request, unreachable: str) -> Plan:
 
 def _bounded(plan: Plan, request: Request) -> Plan:
     """The plan with a way to prove what no flight undercuts; of its duration, where that was asked for."""
-    if plan.status is not PlanStatus.OPTIMAL or plan.propellant <= 0.0:
+    if plan.status is not PlanStatus.OPTIMAL or plan.propellant <= 0.0 or plan.problem.rotates:
         return plan
     this_time_alone = request.time_of_flight is not None
     return replace(plan, proof=partial(_prove_bound, plan.problem, plan.trajectory, this_time_alone))
@@ -235,7 +235,7 @@ def within_limits(plan: Plan, plan_again: Callable[[int, Plan], Plan]) -> Plan:
         # a relaxed thrust that turns round does so within one interval of any mesh
         turns = worst == "thrust_dip" and plan.method != "casadi"
         stalls = stalls + 1 if excess[worst] > 0.7 * before else 0
-        if finer > MOST_NODES or turns or worst not in _CURED_BY_NODES or stalls == 2:
+        if finer > MOST_NODES or turns or worst in _NOT_CURED_BY_NODES or stalls == 2:
             return missed
         before = excess[worst]
         again = plan_again(finer, plan)
@@ -277,7 +277,8 @@ def _prove_infeasible(request: Request, anywhere: bool) -> Certificate | ConvexS
     from guidance.planning.convex_planner import prove_infeasible
     from guidance.planning.infeasibility import prove_by_dual_bound
 
-    if request.time_of_flight is None and not request.bounds_first and not anywhere:
+    bounded = request.bounds_first or request.problem.rotates
+    if request.time_of_flight is None and not bounded and not anywhere:
         proof = prove_by_dual_bound(request.problem)
         if proof is not None:
             return proof

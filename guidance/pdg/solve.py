@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from guidance.constants import MOON_GRAVITY
+from guidance.descent.limits import NO_LIMITS, Limits
 from guidance.descent.plan import InfeasibleError, Plan, PlanStatus, SolverFailedError
 from guidance.descent.problem import LandingProblem
 from guidance.lander import PAPER_LANDER, Lander
@@ -37,7 +38,9 @@ def solve_pdg(
     *,
     lander: Lander = PAPER_LANDER,
     gravity: ArrayLike = MOON_GRAVITY,
+    angular_velocity: ArrayLike = (0.0, 0.0, 0.0),
     target_velocity: ArrayLike = (0.0, 0.0, 0.0),
+    limits: Limits = NO_LIMITS,
     glide_slope_limit: float | None = None,
     speed_limit: float | None = None,
     time_of_flight: float | None = None,
@@ -54,9 +57,11 @@ def solve_pdg(
         target: [m] shape (3,), site frame; the trajectory never goes below its altitude.
         lander: the vehicle. Its pointing limit is measured from the z axis.
         gravity: [m/s^2] shape (3,).
+        angular_velocity: [rad/s] shape (3,), of the site frame about an axis through its origin.
         target_velocity: [m/s] shape (3,), at the target; one that points up, from below, is infeasible.
-        glide_slope_limit: [rad] greatest angle from the z axis, seen from the landing point, in (0, pi/2].
-        speed_limit: [m/s] greatest speed.
+        limits: what the path has to keep.
+        glide_slope_limit: [rad] shorthand for `limits.glide_slope`.
+        speed_limit: [m/s] shorthand for `limits.speed`.
         time_of_flight: [s] None searches for the best.
         nodes: N, for N - 1 intervals, equal ones or those of each arc of 'indirect'; more where the flown
             plan does not keep its limits on so few, or the arcs need them.
@@ -83,9 +88,9 @@ def solve_pdg(
         finite_vector("target", target, 3),
         lander,
         finite_vector("gravity", gravity, 3),
-        glide_slope_limit,
-        speed_limit,
+        _with_shorthands(limits, glide_slope=glide_slope_limit, speed=speed_limit),
         finite_vector("target_velocity", target_velocity, 3),
+        finite_vector("angular_velocity", angular_velocity, 3),
     )
     _check_choices(nodes, method, unreachable, guess)
     plan = answer(Request(problem, nodes, _seconds(time_of_flight), method, guess), unreachable)
@@ -117,6 +122,22 @@ def replan(
     """
     _check_choices(nodes, method, unreachable, None)
     return answer(Request(problem, nodes, _seconds(time_of_flight), method, provisional=True), unreachable)
+
+
+def _with_shorthands(limits: Limits, **shorthands: float | None) -> Limits:
+    """The limits with those that were given by a keyword of their own, `NAME_limit`."""
+    if not isinstance(limits, Limits):
+        raise ValueError(f"limits must be a Limits, got {limits!r}")
+    for name, value in shorthands.items():
+        if value is None:
+            continue
+        if getattr(limits, name) is not None:
+            raise ValueError(f"{name}_limit and limits.{name} are the same limit: give one of them")
+        try:
+            limits = replace(limits, **{name: value})
+        except ValueError as error:
+            raise ValueError(str(error).replace(f"limits.{name}", f"{name}_limit")) from None
+    return limits
 
 
 def _seconds(time_of_flight: float | None) -> float | None:

@@ -13,9 +13,10 @@ from guidance.convex.constraint_set import ConstraintSet
 from guidance.convex.programme import ConvexSolution, ConvexTemplate, convex_template
 from guidance.convex.scaling import ScaledProblem, scale_problem
 from guidance.descent.problem import LandingProblem
-from guidance.descent.residuals import FLIGHT_TOLERANCE, pointing_excess
+from guidance.descent.residuals import FLIGHT_TOLERANCE, final_thrust_excess, pointing_excess
 
 _THRUST_TOLERANCE = 5e-4  # relative; half of what a plan promises
+_RATE_TOLERANCE = 0.5 * FLIGHT_TOLERANCE.thrust_rate
 _DIP = FLIGHT_TOLERANCE.thrust_dip
 MOST_REFINEMENTS = 8
 """Linearisations of the thrust bounds before a time of flight is given up."""
@@ -86,11 +87,16 @@ class ConvexTask:
 
 
 def bounds_hold(problem: LandingProblem, solution: ConvexSolution, reference: Array | None) -> bool:
-    """Whether the true bounds on mass times acceleration hold, and no thrust is given away, to 0.05 %."""
+    """Whether the true bounds on mass times acceleration hold, and no thrust is given away, to 0.05 %.
+
+    Its change per second is held to 0.5 %.
+    """
     log_mass = solution.log_mass
     thrust = solution.answer.primal[solution.layout.slack] * np.exp(log_mass)  # share of the full thrust
     ratio = problem.lander.min_thrust / problem.lander.max_thrust
     if thrust.max() > 1.0 + _THRUST_TOLERANCE or thrust.min() < ratio * (1.0 - _THRUST_TOLERANCE):
+        return False
+    if not _rate_holds(problem, solution):
         return False
     if reference is None:
         return True
@@ -99,8 +105,18 @@ def bounds_hold(problem: LandingProblem, solution: ConvexSolution, reference: Ar
     return 0.5 * float(np.max((log_mass - reference) ** 2)) < _THRUST_TOLERANCE
 
 
+def _rate_holds(problem: LandingProblem, solution: ConvexSolution) -> bool:
+    """Whether the thrust changes from node to node no faster than it may, to 0.5 %."""
+    limit = problem.limits.thrust_rate
+    if limit is None:
+        return True
+    share = solution.answer.primal[solution.layout.acceleration] * np.exp(solution.log_mass)[:, None]
+    step = np.linalg.norm(np.diff(share, axis=0), axis=1).max() * problem.lander.max_thrust
+    return bool(step * (share.shape[0] - 1) <= (1.0 + _RATE_TOLERANCE) * limit * solution.time)
+
+
 def relaxation_tight(problem: LandingProblem, solution: ConvexSolution) -> bool:
-    """Whether the thrust itself, not only its slack, keeps min_thrust and the pointing limit to 0.1 %.
+    """Whether the thrust itself, not only its slack, keeps min_thrust and its direction's limits to 0.1 %.
 
     It does wherever the convexification is lossless. It may not where the time of flight is fixed and too
     long, where the engine's least thrust exceeds the weight, or where the thrust turns round from one node to
@@ -114,6 +130,8 @@ def relaxation_tight(problem: LandingProblem, solution: ConvexSolution) -> bool:
         return False
     between = _least_between(acceleration) * np.exp(solution.log_mass[1:])
     if ratio > 0.0 and between.min() < ratio * (1.0 - _DIP):
+        return False
+    if final_thrust_excess(acceleration, problem, 1.0) > FLIGHT_TOLERANCE.pointing:
         return False
     return pointing_excess(acceleration, limit, 1.0) <= FLIGHT_TOLERANCE.pointing
 

@@ -39,9 +39,11 @@ class _Search:
     def of(cls, task: ConvexTask) -> _Search:
         """The search for a task: J has a known shape, unless the flight ends with a velocity.
 
-        There it has kinks too where burns meet the nodes of a coarse mesh.
+        There it has kinks too where burns meet the nodes of a coarse mesh. In a frame that turns it is not
+        known either.
         """
-        return cls(BracketSearch, 20.0) if task.problem.target_velocity.any() else cls(TimeSearch, 2.0)
+        unknown = task.problem.target_velocity.any() or task.problem.rotates
+        return cls(BracketSearch, 20.0) if unknown else cls(TimeSearch, 2.0)
 
 
 @dataclass(frozen=True, eq=False)

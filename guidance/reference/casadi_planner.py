@@ -17,13 +17,15 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from guidance.arrays import Array
+from guidance.descent.limits import Cone
 from guidance.descent.plan import Plan, PlanStatus
 from guidance.descent.problem import LandingProblem
 from guidance.descent.trajectory import Trajectory
 from guidance.flight_time.time_window import TimeWindow, forbidden_by, guess_time, time_window
-from guidance.reference.nonlinear_program import Limits, NonlinearSolver, nonlinear_program
+from guidance.reference.nonlinear_program import NonlinearSolver, Structure, nonlinear_program
 from guidance.reference.trajectory_guess import (
     is_vertical,
     least_energy_flight,
@@ -40,26 +42,35 @@ _GREATEST_LEAST = 1.0 - 5e-4  # of full thrust: an interior-point method needs r
 _GREATEST_MIDWAY = 0.98  # of full thrust: an engine without throttle may turn by 23 degrees an interval
 
 
-def _parameters(problem: LandingProblem, units: Units, times: TimeWindow, smoothing: float) -> Array:
-    lander = problem.lander
+def _parameters(
+    problem: LandingProblem, units: Units, times: TimeWindow, smoothing: float
+) -> dict[str, ArrayLike]:
+    """Every number of a case by its name, scaled; a limit that is not set is not read."""
+    lander, final = problem.lander, problem.limits.final_thrust_direction or Cone(math.pi)
+    sight = problem.limits.line_of_sight or Cone(math.pi / 2)
     least = lander.min_thrust / lander.max_thrust
-    return np.concatenate(
-        [
-            problem.offset / units.length,
-            problem.state.velocity / units.speed,
-            problem.target_velocity / units.speed,
-            problem.gravity / units.acceleration,
-            [
-                units.speed / lander.exhaust_velocity,
-                min(least, _GREATEST_LEAST),
-                min(least, _GREATEST_MIDWAY),
-            ],
-            [-problem.log_mass_ratio, 1e-8 if lander.min_thrust > 0.0 else smoothing],
-            [math.cos(lander.pointing_limit or math.pi)],
-            [problem.glide_slope_limit or 0.0, (problem.speed_bound or 0.0) / units.speed],
-            np.array([times.low, times.high]) / units.time,
-        ]
-    )
+    return {
+        "position": problem.offset / units.length,
+        "velocity": problem.state.velocity / units.speed,
+        "target_velocity": problem.target_velocity / units.speed,
+        "gravity": problem.pull_at_target / units.acceleration,
+        "spin": problem.angular_velocity * units.time,
+        "flow": units.speed / lander.exhaust_velocity,
+        "least_thrust": min(least, _GREATEST_LEAST),
+        "least_midway": min(least, _GREATEST_MIDWAY),
+        "dry": -problem.log_mass_ratio,
+        "smoothing": 1e-8 if lander.min_thrust > 0.0 else smoothing,
+        "pointing": math.cos(lander.pointing_limit or math.pi),
+        "glide": problem.glide_slope_limit or 0.0,
+        "speed": (problem.speed_bound or 0.0) / units.speed,
+        "low": times.low / units.time,
+        "high": times.high / units.time,
+        "final_axis": final.axis,
+        "final_cosine": math.cos(final.angle),
+        "sight_axis": sight.axis,
+        "sight_angle": sight.angle,
+        "rate": (problem.limits.thrust_rate or 0.0) / lander.max_thrust * units.time,
+    }
 
 
 def _pack(units: Units, problem: LandingProblem, flight: Trajectory, free_time: bool) -> Array:
@@ -120,14 +131,14 @@ def plan_casadi(
     cause = window.cause if time_of_flight is None else forbidden_by(problem, time_of_flight)
     if cause:
         return Plan(PlanStatus.INFEASIBLE, problem, METHOD, message=cause)
-    limits = Limits.of(problem, nodes, time_of_flight is None)
+    structure = Structure.of(problem, nodes, time_of_flight is None)
     if guess is not None and guess.nodes:
         start = rest_of_flight(problem, guess.trajectory, nodes)
     else:
         start = least_energy_flight(problem, nodes, time_of_flight or guess_time(problem, window))
     times = window if time_of_flight is None else TimeWindow(time_of_flight, time_of_flight)
-    question = _Question(problem, limits, swing_sideways(problem, start), times)
-    chosen = solver or limits.solver
+    question = _Question(problem, structure, swing_sideways(problem, start), times)
+    chosen = solver or structure.solver
     plan = question.answer(chosen)
     if plan.status.has_flight or solver is not None or chosen == "ipopt":
         return plan
@@ -140,7 +151,7 @@ class _Question:
     """One problem with its first guess and the times of flight that are admitted."""
 
     problem: LandingProblem
-    limits: Limits
+    structure: Structure
     start: Trajectory
     times: TimeWindow
 
@@ -165,13 +176,14 @@ class _Question:
         return _SMOOTHING * min(1.0, _LONG / Units.of(self.problem).length)
 
     def _ask(self, solver: NonlinearSolver, smoothing: float) -> Plan:
-        problem, limits, units = self.problem, self.limits, Units.of(self.problem)
-        program = nonlinear_program(limits, solver)
+        problem, structure, units = self.problem, self.structure, Units.of(self.problem)
+        program = nonlinear_program(structure, solver)
         failed = Plan(PlanStatus.SOLVER_FAILED, problem, METHOD, solves=1)
+        numbers = _parameters(problem, units, self.times, smoothing)
         try:
             answer = program.solver(
-                x0=_pack(units, problem, self.start, limits.free_time),
-                p=_parameters(problem, units, self.times, smoothing),
+                x0=_pack(units, problem, self.start, structure.free_time),
+                p=np.concatenate([np.ravel(numbers[name]) for name in program.parameters]),
                 lbg=program.lower,
                 ubg=program.upper,
             )
@@ -182,7 +194,7 @@ class _Question:
             limited = stats["unified_return_status"] == "SOLVER_RET_LIMITED"
             status = PlanStatus.LIMIT_REACHED if limited else PlanStatus.SOLVER_FAILED
             return replace(failed, status=status, message=f"{solver}: {stats['return_status']}")
-        time = None if limits.free_time else self.times.low
-        flight = _unpack(units, problem, np.array(answer["x"]).ravel(), limits.nodes, time)
+        time = None if structure.free_time else self.times.low
+        flight = _unpack(units, problem, np.array(answer["x"]).ravel(), structure.nodes, time)
         plan = Plan.of_flight(PlanStatus.OPTIMAL, problem, METHOD, flight, solves=1)
         return replace(plan, message=f"{plan.message} ({solver})")

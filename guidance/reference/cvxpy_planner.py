@@ -23,6 +23,7 @@ import numpy as np
 from guidance.arrays import Array
 from guidance.descent.plan import Plan, PlanStatus
 from guidance.descent.problem import LandingProblem
+from guidance.descent.rotating_frame import transition
 from guidance.descent.trajectory import Trajectory, no_trajectory
 from guidance.flight_time.time_window import forbidden_by, time_window
 from guidance.golden_section import divide, keep_lower, keep_upper
@@ -30,16 +31,22 @@ from guidance.reference.units import Units
 
 METHOD = "cvxpy"
 _LINEARISATIONS = 6
+_SETTLED = 2e-4  # greatest square of a change of ln(mass), in which the thrust bounds are wrong by half of it
+_SETTLED_RATE = 1e-5  # the same, where its root is wrong in the rate of the thrust
 _TIME_TOLERANCE = 2e-3  # relative; the optimum is flat in time
 
 
-class _Limits(NamedTuple):
+class _Structure(NamedTuple):
     """Which limits a problem has beyond the full thrust and the altitude."""
 
     min_thrust: bool
     pointing: bool
     glide_slope: bool
     speed: bool
+    final_thrust: bool = False
+    sight: bool = False
+    rate: bool = False
+    rotates: bool = False
 
 
 class _Model(NamedTuple):
@@ -51,7 +58,7 @@ class _Model(NamedTuple):
 
 
 @lru_cache(maxsize=8)
-def _model(nodes: int, limits: _Limits) -> _Model:
+def _model(nodes: int, structure: _Structure) -> _Model:
     """Disciplined-parametrised problem of some nodes and limits."""
     import cvxpy as cp
 
@@ -72,6 +79,15 @@ def _model(nodes: int, limits: _Limits) -> _Model:
         "pointing": cp.Parameter(),
         "glide": cp.Parameter(nonneg=True),
         "speed": cp.Parameter(nonneg=True),
+        "final_axis": cp.Parameter(3),
+        "final_cosine": cp.Parameter(),
+        "sight_along": cp.Parameter(3),
+        "sight_across": cp.Parameter((3, 2)),
+        "thrust_step": cp.Parameter(nonneg=True),
+        "step": cp.Parameter((6, 6)),  # of the state, transposed; then of the thrust
+        "first": cp.Parameter((3, 6)),
+        "last": cp.Parameter((3, 6)),
+        "fall": cp.Parameter((1, 6)),
     }
     ones = np.ones((nodes - 1, 1))
     g_dt, g_dt2 = (cp.reshape(p[name], (1, 3), order="C") for name in ("g_dt", "g_dt2"))
@@ -81,22 +97,36 @@ def _model(nodes: int, limits: _Limits) -> _Model:
         z[0] == 0,
         r[-1] == 0,
         v[-1] == p["vf"],
-        r[1:] == r[:-1] + p["dt"] * v[:-1] + p["dt2"] * (u[:-1] / 3 + u[1:] / 6) + ones @ g_dt2 / 2,
-        v[1:] == v[:-1] + p["dt"] * (u[:-1] + u[1:]) / 2 + ones @ g_dt,
         z[1:] == z[:-1] - p["burn"] * (s[:-1] + s[1:]),
         cp.norm(u, axis=1) <= s,
         cp.multiply(p["mass"], s) <= p["offset"] - z,
         r[1:-1, 2] >= 0,
     ]
-    if limits.min_thrust:
+    if structure.rotates:
+        before, after = cp.hstack([r[:-1], v[:-1]]), cp.hstack([r[1:], v[1:]])
+        pushed = u[:-1] @ p["first"] + u[1:] @ p["last"]
+        rules.append(after == before @ p["step"] + pushed + ones @ p["fall"])
+    else:
+        rules += [
+            r[1:] == r[:-1] + p["dt"] * v[:-1] + p["dt2"] * (u[:-1] / 3 + u[1:] / 6) + ones @ g_dt2 / 2,
+            v[1:] == v[:-1] + p["dt"] * (u[:-1] + u[1:]) / 2 + ones @ g_dt,
+        ]
+    if structure.min_thrust:
         floor = cp.Variable(nodes)  # keeps each product to one parameter
         rules += [floor == p["offset"] - z, cp.multiply(p["mass"], s) >= p["ratio"] * floor]
-    if limits.pointing:
+    if structure.pointing:
         rules.append(u[:, 2] >= p["pointing"] * s)
-    if limits.glide_slope:
+    if structure.glide_slope:
         rules.append(cp.norm(r[:-1, :2], axis=1) <= p["glide"] * r[:-1, 2])
-    if limits.speed:
+    if structure.speed:
         rules.append(cp.norm(v, axis=1) <= p["speed"])
+    if structure.final_thrust:
+        rules.append(u[-1] @ p["final_axis"] >= p["final_cosine"] * s[-1])
+    if structure.sight:
+        rules.append(cp.norm(r[:-1] @ p["sight_across"], axis=1) <= r[:-1] @ p["sight_along"])
+    if structure.rate:
+        thrust = cp.multiply(cp.reshape(p["mass"], (nodes, 1), order="C") @ np.ones((1, 3)), u)
+        rules.append(cp.norm(thrust[1:] - thrust[:-1], axis=1) <= p["thrust_step"])
     return _Model(cp.Problem(cp.Minimize(-z[-1]), rules), p, {"r": r, "v": v, "u": u, "z": z, "s": s})
 
 
@@ -105,12 +135,16 @@ def forget_models() -> None:
     _model.cache_clear()
 
 
-def _limits(problem: LandingProblem) -> _Limits:
-    return _Limits(
+def _structure(problem: LandingProblem) -> _Structure:
+    return _Structure(
         problem.lander.min_thrust > 0.0,
         problem.lander.pointing_limit is not None,
         problem.has_glide_slope,
         problem.speed_limit is not None,
+        problem.limits.final_thrust_direction is not None,
+        problem.limits.line_of_sight is not None,
+        problem.limits.thrust_rate is not None,
+        problem.rotates,
     )
 
 
@@ -138,9 +172,9 @@ def _solve_once(problem: LandingProblem, nodes: int, time: float, reference: Arr
     import cvxpy as cp
 
     units = Units.of(problem)
-    model, p, x = _model(nodes, _limits(problem))
+    model, p, x = _model(nodes, _structure(problem))
     dt = time / (nodes - 1) / units.time
-    gravity = problem.gravity / units.acceleration
+    gravity = problem.pull_at_target / units.acceleration
     p["r0"].value, p["v0"].value = problem.offset / units.length, problem.state.velocity / units.speed
     p["vf"].value = problem.target_velocity / units.speed
     p["dt"].value, p["dt2"].value = dt, dt**2
@@ -151,6 +185,18 @@ def _solve_once(problem: LandingProblem, nodes: int, time: float, reference: Arr
     p["pointing"].value = math.cos(problem.lander.pointing_limit or math.pi)
     p["glide"].value = math.tan(problem.glide_slope_limit or 0.0)
     p["speed"].value = (problem.speed_bound or 0.0) / units.speed
+    final = problem.limits.final_thrust_direction
+    if final is not None:
+        p["final_axis"].value, p["final_cosine"].value = final.direction, math.cos(final.angle)
+    sight = problem.limits.line_of_sight
+    if sight is not None:
+        p["sight_along"].value = math.sin(sight.angle) * sight.direction
+        p["sight_across"].value = math.cos(sight.angle) * sight.across.T
+    if problem.rotates:
+        turned = transition(problem.angular_velocity * units.time, dt)
+        p["step"].value, p["first"].value, p["last"].value = turned.state.T, turned.first.T, turned.last.T
+        p["fall"].value = ((turned.first + turned.last) @ gravity)[None]
+    p["thrust_step"].value = (problem.limits.thrust_rate or 0.0) / problem.lander.max_thrust * dt * units.time
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # of an inaccurate solution, which its status tells
@@ -176,9 +222,10 @@ def _solve_once(problem: LandingProblem, nodes: int, time: float, reference: Arr
 def _solve_time(problem: LandingProblem, nodes: int, time: float) -> _Flight:
     """Linearise about the last answer until it no longer moves."""
     reference = np.linspace(0.0, -0.5 * problem.log_mass_ratio, nodes)
+    settled = _SETTLED if problem.limits.thrust_rate is None else _SETTLED_RATE
     flight = _solve_once(problem, nodes, time, reference)
     for solves in range(1, _LINEARISATIONS + 1):
-        if not flight.log_mass.size or float(np.max((flight.log_mass - reference) ** 2)) < 2e-4:
+        if not flight.log_mass.size or float(np.max((flight.log_mass - reference) ** 2)) < settled:
             break
         reference = flight.log_mass
         flight = replace(_solve_once(problem, nodes, time, reference), solves=solves + 1)

@@ -22,6 +22,7 @@ from guidance.descent.problem import LandingProblem
 
 NonlinearSolver = Literal["fatrop", "ipopt"]
 _GREATEST_TURN = math.cos(math.radians(45.0))  # in one interval, for an engine that cannot stop
+_SERIES = 9  # second derivatives in the power series of an interval: exact to 1e-12 where it turns by 0.3 rad
 _GLIDE_SMOOTHING = 1e-6  # of the unit of length
 _MOST_ITERATIONS: dict[NonlinearSolver, int] = {"fatrop": 200, "ipopt": 500}
 
@@ -34,7 +35,7 @@ def fatrop_present() -> bool:
 
 
 @dataclass(frozen=True)
-class Limits:
+class Structure:
     """What decides the structure of the programme.
 
     Attributes:
@@ -44,6 +45,10 @@ class Limits:
         pointing: whether the thrust direction is limited.
         glide_slope: whether there is a glide slope limit below the horizon.
         speed: whether the speed is limited.
+        final_thrust: whether the last thrust's direction is limited.
+        sight: whether the vehicle must stay within a cone from the target.
+        rate: whether the change of the thrust is limited.
+        rotates: whether the frame turns.
     """
 
     nodes: int
@@ -52,10 +57,14 @@ class Limits:
     pointing: bool
     glide_slope: bool
     speed: bool
+    final_thrust: bool
+    sight: bool
+    rate: bool
+    rotates: bool
 
     @classmethod
-    def of(cls, problem: LandingProblem, nodes: int, free_time: bool) -> Limits:
-        """The limits of `problem`."""
+    def of(cls, problem: LandingProblem, nodes: int, free_time: bool) -> Structure:
+        """That of `problem`."""
         lander = problem.lander
         return cls(
             nodes,
@@ -64,6 +73,10 @@ class Limits:
             lander.pointing_limit is not None,
             problem.has_glide_slope,
             problem.speed_limit is not None,
+            problem.limits.final_thrust_direction is not None,
+            problem.limits.line_of_sight is not None,
+            problem.limits.thrust_rate is not None,
+            problem.rotates,
         )
 
     @property
@@ -75,14 +88,16 @@ class Limits:
         of 20 degrees.
         """
         limited = self.min_thrust or self.pointing or self.glide_slope or self.speed
+        limited = limited or self.final_thrust or self.sight or self.rate or self.rotates
         return "ipopt" if limited or not fatrop_present() else "fatrop"
 
 
 @dataclass(frozen=True, eq=False)
 class NonlinearProgram:
-    """The assembled programme: `solver` (a CasADi function) and the bounds of its constraints."""
+    """The assembled programme: `solver` (a CasADi function), its parameters, its constraints' bounds."""
 
     solver: Any
+    parameters: tuple[str, ...]
     lower: Array
     upper: Array
 
@@ -90,19 +105,20 @@ class NonlinearProgram:
 class _Stages:
     """The programme's variables and constraints, stage by stage; every number of a case is a parameter."""
 
-    def __init__(self, ca: Any, limits: Limits) -> None:
+    def __init__(self, ca: Any, structure: Structure) -> None:
         """State every stage."""
-        self._ca, self._limits = ca, limits
-        vectors = dict.fromkeys(("position", "velocity", "target_velocity", "gravity"), 3)
+        self._ca, self._structure = ca, structure
+        names = ("position", "velocity", "target_velocity", "gravity", "final_axis", "sight_axis", "spin")
+        vectors = dict.fromkeys(names, 3)
         scalars = ("flow", "least_thrust", "least_midway", "dry", "smoothing", "pointing", "glide", "speed")
-        scalars += ("low", "high")
+        scalars += ("low", "high", "final_cosine", "sight_angle", "rate")
         sizes = vectors | dict.fromkeys(scalars, 1)
         self.numbers = {name: ca.SX.sym(name, size) for name, size in sizes.items()}
-        width = 11 if limits.free_time else 10
-        self.states = [ca.SX.sym(f"x{k}", width) for k in range(limits.nodes)]
-        self.controls = [ca.SX.sym(f"u{k}", 3) for k in range(1, limits.nodes)]
+        width = 11 if structure.free_time else 10
+        self.states = [ca.SX.sym(f"x{k}", width) for k in range(structure.nodes)]
+        self.controls = [ca.SX.sym(f"u{k}", 3) for k in range(1, structure.nodes)]
         self.rows: list[tuple[Any, float, float]] = []
-        for k in range(limits.nodes):
+        for k in range(structure.nodes):
             self._state_stage(k)
 
     def _size(self, u: Any, smoothing: Any = None) -> Any:
@@ -111,13 +127,13 @@ class _Stages:
 
     def _state_stage(self, k: int) -> None:
         """Constraints of one stage; fatrop wants those to the next one first, as x_next - f(x, u)."""
-        x, p, last = self.states[k], self.numbers, self._limits.nodes - 1
+        x, p, last = self.states[k], self.numbers, self._structure.nodes - 1
         r, v, z = x[:3], x[3:6], x[6]
         if k < last:
             self._state_interval(k)
         if k == 0:
             self._add(self._ca.vertcat(r - p["position"], v - p["velocity"], z), 0.0, 0.0)
-            if self._limits.free_time:
+            if self._structure.free_time:
                 self._add(self._ca.vertcat(x[10] - p["low"], p["high"] - x[10]))
         if k == last:
             self._add(self._ca.vertcat(r, v - p["target_velocity"]), 0.0, 0.0)
@@ -128,21 +144,40 @@ class _Stages:
         """Motion and burnt mass from stage k to the next; least thrust midway, against chattering."""
         x, w, p, ca = self.states[k], self.controls[k], self.numbers, self._ca
         r, v, z, u = x[:3], x[3:6], x[6], x[7:10]
-        time = x[10] if self._limits.free_time else p["low"]
-        h = time / (self._limits.nodes - 1)
+        time = x[10] if self._structure.free_time else p["low"]
+        h = time / (self._structure.nodes - 1)
         middle = self._size(0.5 * (u + w))
         burnt = p["flow"] * h * (self._size(u) + 4.0 * middle + self._size(w)) / 6.0
-        travelled = h * v + h**2 * (u / 3.0 + w / 6.0 + p["gravity"] / 2.0)
-        there = [r + travelled, v + h * ((u + w) / 2.0 + p["gravity"]), z - burnt, w]
-        if self._limits.free_time:
+        if self._structure.rotates:
+            there = [*self._turn(x, w, h), z - burnt, w]
+        else:
+            travelled = h * v + h**2 * (u / 3.0 + w / 6.0 + p["gravity"] / 2.0)
+            there = [r + travelled, v + h * ((u + w) / 2.0 + p["gravity"]), z - burnt, w]
+        if self._structure.free_time:
             there.append(time)
         self._add(self.states[k + 1] - ca.vertcat(*there), 0.0, 0.0)
         self._add(ca.exp(z - 0.5 * burnt) * middle - p["least_midway"])
-        if self._limits.min_thrust:  # midway alone lets a strong thrust turn round into a weak one
+        if self._structure.min_thrust:  # midway alone lets a strong thrust turn round into a weak one
             self._add(ca.dot(u, w) - _GREATEST_TURN * self._size(u) * self._size(w))
 
+        if self._structure.rate:
+            self._add((p["rate"] * h) ** 2 - ca.sumsqr(ca.exp(z - burnt) * w - ca.exp(z) * u))
+
+    def _turn(self, x: Any, w: Any, h: Any) -> tuple[Any, Any]:
+        """Position and velocity after an interval in a frame that turns: their power series in time."""
+        ca, p = self._ca, self.numbers
+        pull, rise = x[7:10] + p["gravity"], (w - x[7:10]) / h
+        terms = [x[:3], x[3:6]]  # derivatives of the position
+        for k in range(_SERIES):
+            apparent = ca.cross(p["spin"], 2.0 * terms[k + 1] + ca.cross(p["spin"], terms[k]))
+            terms.append((pull if k == 0 else rise if k == 1 else 0.0) - apparent)
+        weights = [h**k / math.factorial(k) for k in range(_SERIES + 2)]
+        place = sum(weights[k] * terms[k] for k in range(_SERIES + 2))
+        speed = sum(weights[k] * terms[k + 1] for k in range(_SERIES + 1))
+        return place, speed
+
     def _state_limits(self, k: int) -> None:
-        x, p, ca, last = self.states[k], self.numbers, self._ca, self._limits.nodes - 1
+        x, p, ca, last = self.states[k], self.numbers, self._ca, self._structure.nodes - 1
         r, v, u = x[:3], x[3:6], x[7:10]
         size = self._size(u)
         thrust = ca.exp(x[6]) * size
@@ -151,12 +186,18 @@ class _Stages:
         )  # the lower one keeps |u| off its kink
         if 0 < k < last:
             self._add(r[2])
-        if self._limits.pointing:
+        if self._structure.pointing:
             self._add(u[2] - p["pointing"] * size)
-        if self._limits.glide_slope and k < last:
+        if self._structure.final_thrust and k == last:
+            self._add(ca.dot(u, p["final_axis"]) - p["final_cosine"] * size)
+        if self._structure.glide_slope and k < last:
             across = self._size(r[:2], _GLIDE_SMOOTHING)
             self._add(ca.sin(p["glide"]) * r[2] - ca.cos(p["glide"]) * across)
-        if self._limits.speed:
+        if self._structure.sight and k < last:
+            along = ca.dot(r, p["sight_axis"])
+            across = self._size(r - along * p["sight_axis"], _GLIDE_SMOOTHING)
+            self._add(ca.sin(p["sight_angle"]) * along - ca.cos(p["sight_angle"]) * across)
+        if self._structure.speed:
             self._add(p["speed"] ** 2 - ca.sumsqr(v))
 
     def _add(self, expression: Any, lower: float = 0.0, upper: float = math.inf) -> None:
@@ -170,16 +211,14 @@ class _Stages:
 
 
 @lru_cache(maxsize=16)
-def nonlinear_program(limits: Limits, solver: NonlinearSolver) -> NonlinearProgram:
+def nonlinear_program(structure: Structure, solver: NonlinearSolver) -> NonlinearProgram:
     """Assemble for a mesh and a set of limits; kept, since every number of a case is a parameter.
 
-    The parameters, scaled: position (3), velocity (3), target velocity (3), gravity (3), mass flow, least
-    thrust at nodes and midway between, ln of the dry mass, smoothing of |u|, cosine of the pointing limit,
-    glide slope limit [rad], speed limit, shortest and longest time of flight.
+    Its parameters have names, and are scaled; `_Stages` lists them.
     """
     import casadi as ca
 
-    stages = _Stages(ca, limits)
+    stages = _Stages(ca, structure)
     sizes = [part.numel() for part, _, _ in stages.rows]
     lower, upper = (np.repeat([row[side] for row in stages.rows], sizes) for side in (1, 2))
     options: dict[str, Any] = {"print_time": 0, "expand": True, "show_eval_warnings": False}
@@ -188,7 +227,7 @@ def nonlinear_program(limits: Limits, solver: NonlinearSolver) -> NonlinearProgr
         options |= {"structure_detection": "auto", "equality": [bool(e) for e in lower == upper]}
     else:
         # monotone takes half the iterations, and does not converge along a glide slope
-        strategy = "adaptive" if limits.glide_slope else "monotone"
+        strategy = "adaptive" if structure.glide_slope or structure.sight else "monotone"
         options |= {"ipopt.sb": "yes", "ipopt.mu_strategy": strategy}
     problem = {
         "x": stages.decision,
@@ -196,4 +235,6 @@ def nonlinear_program(limits: Limits, solver: NonlinearSolver) -> NonlinearProgr
         "f": -stages.states[-1][6],
         "g": ca.vertcat(*(part for part, _, _ in stages.rows)),
     }
-    return NonlinearProgram(ca.nlpsol("descent", solver, problem, options), lower, upper)
+    return NonlinearProgram(
+        ca.nlpsol("descent", solver, problem, options), tuple(stages.numbers), lower, upper
+    )

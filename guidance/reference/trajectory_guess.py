@@ -29,7 +29,7 @@ def least_energy_flight(problem: LandingProblem, nodes: int, time: float) -> Tra
     fraction = np.linspace(0.0, 1.0, nodes)[:, None]
     start, speed, arrival = problem.offset, problem.state.velocity * time, problem.target_velocity * time
     second, third = -3.0 * start - 2.0 * speed - arrival, 2.0 * start + speed + arrival
-    acceleration = (2.0 * second + 6.0 * third * fraction) / time**2 - problem.gravity
+    acceleration = (2.0 * second + 6.0 * third * fraction) / time**2 - problem.pull_at_target
     # a zero thrust has no direction
     acceleration[:, 2] += 1e-3 * problem.lander.max_thrust / problem.state.mass
     burnt = np.linspace(0.0, 0.5 * problem.log_mass_ratio, nodes)
@@ -66,7 +66,7 @@ def rest_of_flight(problem: LandingProblem, earlier: Trajectory, nodes: int) -> 
 
 def is_vertical(problem: LandingProblem) -> bool:
     """Whether nothing in the problem points sideways, so that every horizontal direction is alike."""
-    vectors = np.array([problem.offset, problem.state.velocity, problem.gravity])
+    vectors = np.array([problem.offset, problem.state.velocity, problem.gravity, problem.angular_velocity])
     across = np.linalg.norm(vectors[:, :2], axis=1)
     return bool((across <= _ON_AXIS * np.maximum(np.linalg.norm(vectors, axis=1), 1e-300)).all())
 

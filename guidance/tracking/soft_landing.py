@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike
 
 from guidance.arrays import Array
 from guidance.constants import MOON_GRAVITY
+from guidance.descent.limits import Limits
 from guidance.descent.plan import Plan, PlanStatus
 from guidance.descent.problem import LandingProblem, lies_below
 from guidance.lander import Lander
@@ -108,7 +109,9 @@ class _Approach:
         if lies_below(start, self.gate):
             return None
         drifting = State(start, self.state.velocity - drift, self.state.mass)
-        problem = LandingProblem(drifting, self.gate, self.engine, self.gravity, speed_limit=self.speed_limit)
+        problem = LandingProblem(
+            drifting, self.gate, self.engine, self.gravity, Limits(speed=self.speed_limit)
+        )
         unreachable = "nearest" if nearest else "raise"
         return replan(problem, self.options.nodes, time_of_flight, self.options.method, unreachable)
 

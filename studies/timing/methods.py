@@ -11,7 +11,7 @@ from time import process_time
 
 import numpy as np
 
-from guidance import InfeasibleError, Lander, Plan, SolverFailedError, State, solve_pdg
+from guidance import InfeasibleError, Lander, Limits, Plan, SolverFailedError, State, solve_pdg
 from guidance.descent.problem import LandingProblem
 from guidance.pdg.solve import DEFAULT_NODES, METHODS, PlanningMethod
 from guidance.reference.casadi_planner import plan_casadi
@@ -80,8 +80,8 @@ def ask(
             problem.target,
             lander=problem.lander,
             gravity=problem.gravity,
-            glide_slope_limit=problem.glide_slope_limit,
-            speed_limit=problem.speed_limit,
+            angular_velocity=problem.angular_velocity,
+            limits=problem.limits,
             target_velocity=problem.target_velocity,
             time_of_flight=time_of_flight,
             nodes=nodes,
@@ -132,7 +132,7 @@ def _problem(case: dict) -> LandingProblem:
         np.array(case["target"], dtype=np.float64),
         Lander(pointing_limit=case["pointing_limit"], **case["lander"]),
         np.array(case["gravity"], dtype=np.float64),
-        case["glide_slope_limit"],
+        Limits(glide_slope=case["glide_slope_limit"]),
     )
 
 

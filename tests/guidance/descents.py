@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from guidance import PAPER_LANDER, Lander, State
+from guidance import PAPER_LANDER, Lander, Limits, State
 from guidance.descent.problem import LandingProblem
 from guidance.pdg.solve import METHODS, PlanningMethod
 
@@ -37,7 +37,7 @@ def problem_of(case):
         np.array(given["target"]),
         given["lander"],
         np.array(given["gravity"]),
-        given["glide_slope_limit"],
+        Limits(glide_slope=given["glide_slope_limit"]),
     )
 
 

@@ -8,6 +8,7 @@ from descents import GRAVITY, TARGET, harsh_start, paper_start
 
 from guidance import PAPER_LANDER, State
 from guidance.bulk.certified_flight import Finding, answer_start, vehicle_of
+from guidance.descent.limits import Limits
 from guidance.descent.problem import LandingProblem
 from guidance.flight_time.extremal import LEGS, PrimerPath
 from guidance.flight_time.neighbouring_extremals import new_extremal
@@ -73,19 +74,16 @@ def test_limits_refuse_what_the_indirect_method_refuses():
         lander = replace(PAPER_LANDER, pointing_limit=rng.uniform(0.3, 1.8)) if k % 3 == 0 else PAPER_LANDER
         glide = float(rng.uniform(0.3, math.pi / 2)) if k % 3 == 1 else None
         speed = float(rng.uniform(30.0, 90.0)) if k % 3 == 2 else None
-        problem = LandingProblem(State.parse(start), TARGET, lander, GRAVITY, glide, speed)
+        problem = LandingProblem(
+            State.parse(start), TARGET, lander, GRAVITY, Limits(glide_slope=glide, speed=speed)
+        )
         vehicle = vehicle_of(lander, GRAVITY, glide, speed)
         answer, _ = answer_start(np.array(start), TARGET, vehicle, new_extremal())
         seen[Finding(answer.finding)] += 1
         flight = find_primer_flight(problem)
         assert (flight is not None) == (answer.finding == Finding.OPTIMAL)
         if answer.finding in OF_LIMIT and OF_LIMIT[Finding(answer.finding)] != "altitude":
-            freed = replace(
-                problem,
-                lander=replace(lander, pointing_limit=None),
-                glide_slope_limit=None,
-                speed_limit=None,
-            )
+            freed = replace(problem, lander=replace(lander, pointing_limit=None), limits=Limits())
             assert find_primer_flight(freed) is not None
     assert all(seen[finding] > 5 for finding in (Finding.OPTIMAL, Finding.INFEASIBLE, Finding.NO_FLIGHT))
     assert all(seen[finding] > 5 for finding in (Finding.LEANS, Finding.TOO_FAST, Finding.OFF_GLIDE_SLOPE))

@@ -82,7 +82,7 @@ def test_free_time_names_its_scope():
     far = task(target=np.array([4000.0, 0.0, 50.0]))
     lander = Lander(max_thrust=3077.663, specific_impulse=388.5878, min_thrust=307.766, pointing_limit=2.2)
     start = [-34.3, 36.7, 205.5, -3.1, 5.6, -16.4, 1233.466]
-    steep = task(start, np.zeros(3), lander=lander, glide_slope_limit=0.35)
+    steep = task(start, np.zeros(3), lander=lander, limits=guidance.Limits(glide_slope=0.35))
     for certificate, cause, words in (
         (prove_by_dual_bound(far.problem), "propellant", "dual bound"),
         (prove_free_time(far), "propellant", "Farkas"),

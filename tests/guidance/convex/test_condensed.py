@@ -96,6 +96,6 @@ def test_what_is_infeasible_only_by_the_floor_is_told_so():
 
 
 def test_limits_on_the_path_are_not_condensed():
-    assert ConstraintSet(NODES, min_thrust=True, pointing=True).can_condense
-    for name in ("glide_slope", "speed_limit", "free_landing_point"):
+    assert ConstraintSet(NODES, min_thrust=True, pointing=True, final_thrust_direction=True).can_condense
+    for name in ("glide_slope", "speed_limit", "line_of_sight", "rotates", "free_landing_point"):
         assert not ConstraintSet(NODES, **{name: True}).can_condense

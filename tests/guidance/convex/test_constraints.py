@@ -4,8 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given, reject
+from hypothesis import strategies as st
 
-from guidance import Lander, State
+from guidance import Cone, Lander, Limits, State
 from guidance.convex import constraints
 from guidance.convex.condensed import CondensedLayout, burnt_mass, landing_moments
 from guidance.convex.layout import Layout
@@ -23,8 +25,13 @@ PROBLEM = LandingProblem(
     np.array([5.0, 5.0, 50.0]),
     LANDER,
     np.array([0.1, -0.2, -1.62]),
-    glide_slope_limit=0.5,
-    speed_limit=40.0,
+    Limits(
+        glide_slope=0.5,
+        speed=40.0,
+        final_thrust_direction=Cone(0.3, (0.6, 0.0, 0.8)),
+        line_of_sight=Cone(0.8, (0.6, 0.0, 0.8)),
+        thrust_rate=900.0,
+    ),
     target_velocity=np.array([1.0, -2.0, -6.0]),
 )
 TIME = 20.0
@@ -139,6 +146,79 @@ def test_glide_slope_is_seen_from_the_landing_point():
         assert np.sign(round(rows.violation(x), 12)) == np.sign(change)
 
 
+@pytest.mark.parametrize("angle", [0.2, 1.4, 2.4])
+def test_final_thrust_direction_binds_the_last_node_alone(angle):
+    scaled = replace(SCALED, final_thrust=np.array([0.6, 0.0, 0.8, np.cos(angle)]))
+    rows = constraints.final_thrust_direction(LAYOUT, scaled)
+    for change in (-0.1, 0.0, 0.1):
+        lean = np.arctan2(0.6, 0.8) + angle + change  # in the plane of the axis
+        x = filled(acceleration=[0.0, 0.0, -0.5], slack=0.5)
+        x[LAYOUT.acceleration[-1]] = 0.5 * np.array([np.sin(lean), 0.0, np.cos(lean)])
+        assert np.sign(round(rows.violation(x), 12)) == np.sign(change)
+
+
+def test_the_rate_of_the_thrust_in_newtons_a_second():
+    """Linearised at its own mass, the rows' violation is what the thrust of a node exceeds."""
+    limited = replace(PROBLEM, limits=Limits(thrust_rate=900.0))
+    log_mass, step = np.linspace(0.0, -0.04, NODES), TIME / (NODES - 1)
+    mass = PROBLEM.state.mass * np.exp(log_mass)
+    scaled = scale_problem(limited, TIME, NODES, log_mass)
+    thrust = 3000.0 + np.array([0.0, 1.0, 0.0, -1.0, -2.0, -1.0, 0.0])[:, None] * 900.0 * step * np.eye(3)[2]
+    for axis, change in ((0, 0.0), (1, 240.0)):
+        moved = thrust.copy()
+        moved[2, axis] += change
+        rows = constraints.thrust_rate(LAYOUT, scaled)
+        x = filled(acceleration=moved / mass[:, None] / scaled.acceleration)
+        excess = rows.violation(x) * LANDER.max_thrust
+        expected = np.linalg.norm(np.diff(moved, axis=0), axis=1).max() - 900.0 * step
+        assert excess == pytest.approx(expected, abs=1e-6)
+
+
+@given(seed=st.integers(0, 1_000_000))
+def test_the_relaxed_rate_of_the_thrust_excludes_no_flight(seed):
+    """Any thrust within the bounds, and the greatest rate that it has from node to node."""
+    rng = np.random.default_rng(seed)
+    time, mass = rng.uniform(5.0, 60.0), np.empty(NODES)
+    free = Lander(
+        dry_mass=700.0, max_thrust=rng.uniform(4e3, 4e4), specific_impulse=rng.uniform(150.0, 450.0)
+    )
+    step, push = time / (NODES - 1), rng.normal(size=(NODES, 3))
+    thrust = rng.uniform(0.0, free.max_thrust, NODES)[:, None] * push / np.linalg.norm(push, axis=1)[:, None]
+    mass[0] = PROBLEM.state.mass
+    for k in range(NODES - 1):  # trapezoidal in ln(mass), as the mesh burns it
+        size = np.linalg.norm(thrust[k : k + 2], axis=1)
+        mass[k + 1] = mass[k] * np.exp(-0.5 * step * size.sum() / mass[k] / free.exhaust_velocity)
+    if mass[-1] <= free.dry_mass:
+        reject()
+    rate = np.linalg.norm(np.diff(thrust, axis=0), axis=1).max() / step
+    problem = replace(PROBLEM, lander=free, limits=Limits(thrust_rate=float(rate)))
+    scaled = scale_problem(problem, time, NODES)
+    push = thrust / mass[:, None] / scaled.acceleration
+    x = filled(acceleration=push, slack=np.linalg.norm(push, axis=1))
+    assert constraints.thrust_rate(LAYOUT, scaled).violation(x) <= 1e-12
+
+
+def test_line_of_sight_is_seen_from_the_target():
+    cone, apex = Cone(0.5, (0.6, 0.0, 0.8)), np.array([0.2, -0.1, 0.05])
+    rows = np.vstack([np.sin(cone.angle) * cone.direction, np.cos(cone.angle) * cone.across])
+    scaled = replace(SCALED, sight=rows, sight_apex=apex)
+
+    def seen_at(angle, layout, node):
+        x = filled(layout, position=apex + 0.4 * cone.direction)
+        aside = np.cos(angle) * cone.direction + np.sin(angle) * cone.across[1]
+        x[layout.position[node]] = apex + 0.3 * aside
+        return x
+
+    for layout, nodes in ((LAYOUT, range(NODES - 1)), (FREE, range(NODES))):
+        family = constraints.line_of_sight(layout, scaled)
+        assert family.bound.size == 3 * len(nodes)
+        for node in nodes:
+            assert family.violation(seen_at(0.4, layout, node)) < 0.0
+            assert family.violation(seen_at(0.5, layout, node)) == pytest.approx(0.0, abs=1e-12)
+            outside = 0.3 * np.sin(0.1)  # the distance from the surface
+            assert family.violation(seen_at(0.6, layout, node)) == pytest.approx(outside)
+
+
 def test_speed_limit():
     def flying(speed):
         return filled(velocity=np.array([0.0, 0.6, -0.8]) * speed / (SCALED.acceleration * TIME))
@@ -231,12 +311,21 @@ def test_numbers_go_with_time_as_declared():
         constraints.max_thrust,
         constraints.min_thrust,
         constraints.pointing,
+        constraints.final_thrust_direction,
+        constraints.line_of_sight,
+        constraints.thrust_rate,
         constraints.glide_slope,
         constraints.speed_limit,
         constraints.dry_mass,
         constraints.landing_error_limit,
     ]
-    condensed: list[Family] = [burnt_mass, landing_moments, constraints.max_thrust, constraints.dry_mass]
+    condensed: list[Family] = [
+        burnt_mass,
+        landing_moments,
+        constraints.max_thrust,
+        constraints.final_thrust_direction,
+        constraints.dry_mass,
+    ]
     step = 1e-5
     for layout, families in ((FREE, whole), (CondensedLayout(NODES), condensed)):
         for family in families:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from descents import CASES, FEASIBLE, TARGET, paper_start, problem_of
 
-from guidance import PAPER_LANDER, Lander, State
+from guidance import PAPER_LANDER, Lander, Limits, State
 from guidance.constants import MOON_GRAVITY
 from guidance.convex import constraints
 from guidance.convex.constraint_set import ConstraintSet
@@ -72,7 +72,7 @@ def test_units_do_not_matter(case):
             specific_impulse=lander.specific_impulse * speed,
         ),
         problem.gravity * speed / minute,
-        problem.glide_slope_limit,
+        problem.limits,
     )
     here = ConvexTask(problem, NODES).solve(time)
     there = ConvexTask(other, NODES).solve(time * minute)
@@ -115,8 +115,8 @@ def test_slope_of_the_landing_error():
 @pytest.mark.parametrize(
     ("name", "change"),
     [
-        ("speed limit", {"speed_limit": 45.0}),
-        ("glide slope", {"glide_slope_limit": 0.25}),
+        ("speed limit", {"limits": Limits(speed=45.0)}),
+        ("glide slope", {"limits": Limits(glide_slope=0.25)}),
         ("pointing", {"lander": Lander(pointing_limit=0.6)}),
         ("minimum thrust", {"lander": Lander(min_thrust=1500.0)}),
         ("maximum thrust", {"lander": Lander(max_thrust=7000.0)}),

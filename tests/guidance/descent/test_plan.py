@@ -8,7 +8,7 @@ import pytest
 from descents import FEASIBLE, TARGET, arguments
 
 import guidance
-from guidance import Plan, PlanStatus
+from guidance import Limits, Plan, PlanStatus
 from guidance.descent.picture import draw_plan, save_plan_figure
 
 START = [180.0, 120.0, 940.0, -7.0, -4.0, -28.0, 1200.0]
@@ -99,8 +99,8 @@ def test_residuals_measure_the_limits_of_the_problem(plan):
         return replace(plan, problem=replace(plan.problem, **changes)).residuals
 
     fastest = np.linalg.norm(plan.velocity, axis=1).max()
-    assert judged(speed_limit=fastest - 1.0).speed == pytest.approx(1.0, abs=0.01)
-    assert judged(glide_slope_limit=0.05).glide_slope > 10.0
+    assert judged(limits=Limits(speed=fastest - 1.0)).speed == pytest.approx(1.0, abs=0.01)
+    assert judged(limits=Limits(glide_slope=0.05)).glide_slope > 10.0
     assert judged(target=TARGET + np.array([0.0, 0.0, 7.0])).altitude == pytest.approx(7.0, abs=0.01)
     lander = plan.problem.lander
     assert judged(lander=replace(lander, pointing_limit=0.1)).pointing > 0.05

@@ -1,12 +1,12 @@
 """The measure of a flown plan: each number against a closed form."""
 
 import math
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
 
-from guidance import PAPER_LANDER, Lander, State
+from guidance import PAPER_LANDER, Lander, Limits, State
 from guidance.descent.problem import LandingProblem
 from guidance.descent.residuals import Residuals, fly_residuals, pointing_excess
 from guidance.descent.trajectory import Trajectory
@@ -16,7 +16,8 @@ PERFECT = dict.fromkeys((field.name for field in fields(Residuals)), 0.0)
 
 def problem_under(gravity: float, lander: Lander = PAPER_LANDER) -> LandingProblem:
     state = State(np.array([0.0, 0.0, 900.0]), np.array([0.0, 0.0, -30.0]), 1200.0)
-    return LandingProblem(state, np.zeros(3), lander, np.array([0.0, 0.0, -gravity]))
+    limits = Limits(thrust_rate=2500.0)
+    return LandingProblem(state, np.zeros(3), lander, np.array([0.0, 0.0, -gravity]), limits)
 
 
 @pytest.mark.parametrize(("gravity", "unit"), [(1.62, 1.0), (0.1, 1.0), (16.2, 10.0)])
@@ -28,8 +29,11 @@ def test_lengths_and_speeds_are_allowed_in_proportion_to_gravity_and_the_rest_al
         "thrust_above": 1e-3 * lander.max_thrust,
         "thrust_below": 1e-3 * lander.min_thrust,
         "thrust_dip": 0.04 * lander.min_thrust,
+        "thrust_rate": 0.01 * 2500.0,
         "pointing": 1e-3,
+        "final_thrust_direction": 1e-3,
         "glide_slope": 0.5 * unit,
+        "line_of_sight": 0.5 * unit,
         "altitude": 0.2 * unit,
         "speed": 0.1 * unit,
         "propellant": 1e-3,
@@ -71,6 +75,24 @@ def test_the_relaxation_gap_is_the_thrust_that_is_paid_for_and_not_given():
     turned = thrust.copy()
     turned[-1, 0] *= -1.0
     assert measured(turned) == pytest.approx(40.0, rel=1e-9)
+
+
+def test_the_rate_of_the_thrust_is_that_of_its_vector():
+    """Of constant size and turning evenly: the size times the rate of turn; and a jump is none to forgive."""
+    nodes, turn, size = 201, 0.2, 6000.0
+    time = np.linspace(0.0, 10.0, nodes)
+    thrust = size * np.column_stack([np.sin(turn * time), np.zeros(nodes), np.cos(turn * time)])
+    flow = size / PAPER_LANDER.exhaust_velocity
+    rest, mass = np.zeros((nodes, 3)), 1200.0 - flow * time
+    limits = Limits(thrust_rate=500.0)
+    problem = replace(problem_under(1.62), limits=limits)
+    flight = Trajectory(time, rest, rest.copy(), mass, thrust, PAPER_LANDER.exhaust_velocity)
+    assert fly_residuals(flight, problem).thrust_rate == pytest.approx(turn * size - 500.0, abs=10.0)
+    cut = thrust.copy()
+    cut[100:] = 0.0
+    gone = Trajectory(time.copy(), rest.copy(), rest.copy(), mass.copy(), cut, PAPER_LANDER.exhaust_velocity)
+    assert fly_residuals(gone, problem).thrust_rate == pytest.approx(size / 0.05, rel=0.02)
+    assert fly_residuals(flight, replace(problem, limits=Limits())).thrust_rate == 0.0
 
 
 def test_a_thrust_leans_where_it_burns_and_what_a_solver_leaves_of_none_does_not():

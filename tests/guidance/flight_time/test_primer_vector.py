@@ -11,7 +11,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 import guidance
-from guidance import PAPER_LANDER, Lander, PlanStatus, State
+from guidance import PAPER_LANDER, Lander, Limits, PlanStatus, State
 from guidance.descent.problem import LandingProblem
 from guidance.dynamics import integrate
 from guidance.flight_time.primer_vector import PrimerFlight, find_primer_flight
@@ -165,8 +165,8 @@ def test_straight_down_is_a_suicide_burn():
         (START, {"lander": replace(PAPER_LANDER, max_thrust=1900.0)}),  # weighs 1944 N
         (START, {"lander": replace(PAPER_LANDER, dry_mass=1185.0)}),
         (START, {"lander": replace(PAPER_LANDER, pointing_limit=0.3)}),
-        (START, {"speed_limit": 45.0}),
-        (START, {"glide_slope_limit": 0.2}),
+        (START, {"limits": Limits(speed=45.0)}),
+        (START, {"limits": Limits(glide_slope=0.2)}),
         ([0.0, 0.0, 50.0, 0.0, 0.0, 0.0, 1200.0], {}),
         ([0.0, 0.0, 110.0, 0.0, 0.0, -60.0, 1200.0], {}),
     ],
@@ -178,7 +178,7 @@ def test_refuses_what_lies_outside_its_domain(start, changes):
 def test_limits_that_do_not_bind_change_nothing():
     wide = Lander(pointing_limit=math.pi)
     free = flight_from(START)
-    limited = flight_from(START, lander=wide, speed_limit=90.0, glide_slope_limit=1.5)
+    limited = flight_from(START, lander=wide, limits=Limits(speed=90.0, glide_slope=1.5))
     assert limited.time == free.time
 
 

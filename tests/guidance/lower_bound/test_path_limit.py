@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import guidance
-from guidance import PAPER_LANDER, PlanStatus, State
+from guidance import PAPER_LANDER, Limits, PlanStatus, State
 from guidance.descent.dual_bound import DualBound
 from guidance.descent.problem import LandingProblem
 from guidance.lower_bound import prove_least_propellant, prove_no_flight
@@ -34,7 +34,7 @@ def test_no_flight_that_keeps_the_glide_slope_burns_less(seed):
     flight = random_flight(np.random.default_rng(seed))
     problem = flight.problem
     if flight.slope < 0.49 * math.pi:
-        problem = replace(problem, glide_slope_limit=flight.slope * (1.0 + 1e-9))
+        problem = replace(problem, limits=Limits(glide_slope=flight.slope * (1.0 + 1e-9)))
     propellant = problem.state.mass * -math.expm1(-flight.spent / problem.lander.exhaust_velocity)
     proof = prove_least_propellant(problem, propellant, flight.time)
     assert proof.lower_bound <= propellant * (1.0 + 1e-9)
@@ -96,7 +96,7 @@ def test_a_spoilt_multiplier_is_refused():
         assert not spoilt(path_multiplier=np.array(multiplier)).verified
     assert not spoilt(path_time=-1.0).verified
     assert not spoilt(path_multiplier=3.0 * kinked(proof)[0].path_multiplier).verified
-    level = replace(proof.problem, glide_slope_limit=None)
+    level = replace(proof.problem, limits=Limits())
     assert not replace(proof, problem=level).verified  # a sideways multiplier needs the glide slope
 
 

@@ -10,7 +10,7 @@ from hypothesis import given, reject, settings
 from hypothesis import strategies as st
 
 import guidance
-from guidance import PAPER_LANDER, Lander, PlanStatus, State, propagate
+from guidance import PAPER_LANDER, Lander, Limits, PlanStatus, State, propagate
 from guidance.convex.farkas import FarkasProof
 from guidance.descent.problem import LandingProblem
 from guidance.flight_time.time_window import forbidden_by, guess_time, time_window
@@ -43,9 +43,10 @@ def random_flight(rng):
         return None
     k = rng.choice(lowest)
     speed = max(float(np.linalg.norm(state.velocity)) for state in path[: k + 1])
-    fields = {"speed_limit": speed, "target_velocity": path[k].velocity}
     engine = replace(lander, min_thrust=least)
-    return LandingProblem(start, path[k].position, engine, GRAVITY, None, **fields), times[k]
+    return LandingProblem(
+        start, path[k].position, engine, GRAVITY, Limits(speed=speed), path[k].velocity
+    ), times[k]
 
 
 @settings(max_examples=400)

@@ -11,8 +11,9 @@ from scipy.optimize import brentq
 
 from guidance import Lander, PlanStatus, State, solve_pdg
 from guidance.descent.certificate import Certificate
+from guidance.descent.flown_path import fly_trajectory
 from guidance.descent.plan import Plan
-from guidance.descent.residuals import RESIDUAL_UNITS, fly_trajectory
+from guidance.descent.residuals import RESIDUAL_UNITS
 from guidance.dynamics import integrate, propagate
 from guidance.pdg.__main__ import main
 

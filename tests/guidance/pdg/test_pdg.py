@@ -175,6 +175,8 @@ def test_fixed_time_by_every_method(method):
         ({"target_velocity": [0, 0, math.nan]}, "target_velocity"),
         ({"target_velocity": [0, 0, -1e10]}, "target_velocity"),
         ({"target_velocity": None}, "target_velocity"),
+        ({"angular_velocity": [0, 0]}, "angular_velocity"),
+        ({"angular_velocity": [0, math.inf, 0]}, "angular_velocity"),
         ({"lander": "apollo"}, "lander"),
         ({"glide_slope_limit": 1.6}, "glide_slope_limit"),
         ({"glide_slope_limit": 0.0}, "glide_slope_limit"),

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import guidance
-from guidance import PAPER_LANDER, Lander, PlanStatus, State
+from guidance import PAPER_LANDER, Lander, Limits, PlanStatus, State
 from guidance.descent.problem import ROUNDING, LandingProblem, lies_below
 from guidance.pdg.solve import ARRIVED
 from guidance.tracking.soft_landing import DEFAULT_OPTIONS, plan_soft_landing
@@ -99,7 +99,7 @@ def test_a_start_outside_the_cone_by_rounding_is_moved_onto_it(angle, bearing, s
         [math.cos(angle) * math.cos(bearing), math.cos(angle) * math.sin(bearing), -math.sin(angle)]
     )
     start = TARGET + 400.0 * axis + share * 400.0 * ROUNDING * normal
-    problem = problem_from([*start, 0, 0, 0, 1200], glide_slope_limit=angle)
+    problem = problem_from([*start, 0, 0, 0, 1200], limits=Limits(glide_slope=angle))
     assert problem.outside_glide_slope(problem.offset) < 1e-10
     np.testing.assert_allclose(problem.offset, 400.0 * axis, atol=1e-9)
 

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import guidance
-from guidance import PAPER_LANDER, Lander, PlanStatus, State, propagate
+from guidance import PAPER_LANDER, Lander, Limits, PlanStatus, State, propagate
 from guidance.descent.problem import LandingProblem
 from guidance.flight_time.primer_vector import find_primer_flight
 from guidance.flight_time.time_window import guess_time, time_window
@@ -124,7 +124,7 @@ def test_in_a_frame_that_moves_with_the_velocity_it_is_a_landing_at_rest(seed, s
     [
         ConvexTask(problem_to(VELOCITY), 31),
         ConvexTask(problem_to(VELOCITY), 31, condense=False),
-        ConvexTask(problem_to(VELOCITY, speed_limit=40.0), 31),
+        ConvexTask(problem_to(VELOCITY, limits=Limits(speed=40.0)), 31),
         ConvexTask(problem_to(VELOCITY, lander=Lander(min_thrust=900.0, pointing_limit=0.9)), 31),
         ConvexTask(problem_to(VELOCITY, [0, 0, 950, 8, 0, -30, 1200]), 31, free_landing_point=True),
     ],

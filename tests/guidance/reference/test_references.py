@@ -51,9 +51,9 @@ def test_references_use_nothing_of_the_convex_solver(name):
 
 
 def test_cvxpy_model_is_disciplined_parametrised():
-    from guidance.reference.cvxpy_planner import _Limits, _model
+    from guidance.reference.cvxpy_planner import _model, _Structure
 
-    assert _model(11, _Limits(True, True, True, True)).problem.is_dcp(dpp=True)
+    assert _model(11, _Structure(*[True] * len(_Structure._fields))).problem.is_dcp(dpp=True)
 
 
 def test_references_count_their_solves_and_forget_on_demand():
@@ -72,10 +72,10 @@ def test_references_count_their_solves_and_forget_on_demand():
 PAPER = ([180.0, 120.0, 940.0, -7.0, -4.0, -28.0, 1200.0], [0.0, 0.0, 50.0])
 
 
-def paper_problem(**limits):
-    lander = guidance.Lander(pointing_limit=limits.pop("pointing_limit", None))
+def paper_problem(**given):
+    lander = guidance.Lander(pointing_limit=given.pop("pointing_limit", None))
     state, target = guidance.State.parse(PAPER[0]), np.array(PAPER[1])
-    return LandingProblem(state, target, lander, np.array([0.0, 0.0, -1.62]), **limits)
+    return LandingProblem(state, target, lander, np.array([0.0, 0.0, -1.62]), **given)
 
 
 @pytest.mark.parametrize("time_of_flight", [None, 29.0])
@@ -90,10 +90,15 @@ def test_both_nonlinear_solvers_find_one_optimum(time_of_flight):
 
 
 @pytest.mark.parametrize(
-    "limits", [{"glide_slope_limit": 1.0}, {"speed_limit": 60.0}, {"pointing_limit": 1.0}]
+    "given",
+    [
+        {"limits": guidance.Limits(glide_slope=1.0)},
+        {"limits": guidance.Limits(speed=60.0)},
+        {"pointing_limit": 1.0},
+    ],
 )
-def test_limits_that_fatrop_does_not_solve_reliably_go_to_ipopt(limits):
-    assert plan_casadi(paper_problem(**limits), 31).message == "optimal (ipopt)"
+def test_limits_that_fatrop_does_not_solve_reliably_go_to_ipopt(given):
+    assert plan_casadi(paper_problem(**given), 31).message == "optimal (ipopt)"
 
 
 @pytest.mark.parametrize("breakage", ["gives up", "raises", "is absent"])
@@ -131,7 +136,7 @@ def test_ipopt_takes_over_where_fatrop_fails(monkeypatch, breakage):
 
 def test_fatrop_alone_says_that_it_failed():
     """A glide slope that it does not solve: a status without a flight, not an exception."""
-    plan = plan_casadi(paper_problem(glide_slope_limit=0.3), 61, 30.0, solver="fatrop")
+    plan = plan_casadi(paper_problem(limits=guidance.Limits(glide_slope=0.3)), 61, 30.0, solver="fatrop")
     assert plan.status in (guidance.PlanStatus.SOLVER_FAILED, guidance.PlanStatus.LIMIT_REACHED)
     assert plan.nodes == 0
     assert plan.message.startswith("fatrop: ")
