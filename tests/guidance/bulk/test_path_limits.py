@@ -83,12 +83,7 @@ def test_limits_refuse_what_the_indirect_method_refuses():
         flight = find_primer_flight(problem)
         assert (flight is not None) == (answer.finding == Finding.OPTIMAL)
         if answer.finding in OF_LIMIT and OF_LIMIT[Finding(answer.finding)] != "altitude":
-            freed = replace(
-                problem,
-                lander=replace(lander, pointing_limit=None),
-                glide_slope_limit=None,
-                speed_limit=None,
-            )
+            freed = replace(problem, lander=replace(lander, pointing_limit=None), limits=Limits())
             assert find_primer_flight(freed) is not None
     assert all(seen[finding] > 5 for finding in (Finding.OPTIMAL, Finding.INFEASIBLE, Finding.NO_FLIGHT))
     assert all(seen[finding] > 5 for finding in (Finding.LEANS, Finding.TOO_FAST, Finding.OFF_GLIDE_SLOPE))
