@@ -116,13 +116,14 @@ class QocoTask(ConvexTask):
 
     def ask(self, template: ConvexTemplate, scaled: ScaledProblem) -> ConvexSolution:
         """Have one programme solved."""
-        rows, cost = template.rows(scaled), template.cost(self.least_error)
+        price = self.error_price * scaled.length / scaled.kappa
+        rows, cost = template.rows(scaled), template.cost(self.least_error, price)
         if template not in self.solvers:
             self.solvers[template] = QocoSolver(rows, cost, self.tolerance)
         answer = self.solvers[template].solve(rows, cost)
         if answer.status is not SolveStatus.SOLVED:
             del self.solvers[template]
-        return template.read_answer(scaled, rows, answer, self.least_error)
+        return template.read_answer(scaled, rows, answer, self.least_error, price)
 
 
 def plan_by_cones(task: ConvexTask, method: str, time_of_flight: float | None) -> Plan:
