@@ -1,11 +1,13 @@
 """`python -m guidance.pdg` and the example, as a user runs them."""
 
+import math
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
+from guidance import Cone, Limits, solve_pdg
 from guidance.pdg.__main__ import main
 
 STATE = ["--state", "200", "100", "950", "-8", "-4", "-30", "1200", "--target", "0", "0", "50"]
@@ -29,6 +31,31 @@ def test_arrives_with_the_velocity_that_was_asked_for(capsys):
         main(up)
     assert caught.value.code == 1
     assert "altitude" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "given"),
+    [
+        (
+            ["--final-thrust-limit-deg", "1"],
+            {"limits": Limits(final_thrust_direction=Cone(math.radians(1.0)))},
+        ),
+        (
+            ["--line-of-sight-limit-deg", "1", "--line-of-sight-axis", "2", "1", "9"],
+            {"limits": Limits(line_of_sight=Cone(math.radians(1.0), (2.0, 1.0, 9.0)))},
+        ),
+        (["--thrust-rate-limit", "2000"], {"limits": Limits(thrust_rate=2000.0)}),
+        (["--angular-velocity", "0", "0.002", "0.001"], {"angular_velocity": (0.0, 0.002, 0.001)}),
+        (["--landing-error-weight", "0.01"], {"landing_error_weight": 0.01}),
+    ],
+)
+def test_every_further_request_reaches_the_planner(capsys, words, given):
+    main([*STATE, *words])
+    out = capsys.readouterr().out
+    plan = solve_pdg([float(number) for number in STATE[1:8]], (0.0, 0.0, 50.0), **given)
+    assert f"{plan.propellant:.3f} kg" in out
+    assert f"{plan.status.value} ({plan.method})" in out
+    assert plan.thrust.tobytes() != solve_pdg([*map(float, STATE[1:8])], (0.0, 0.0, 50.0)).thrust.tobytes()
 
 
 def test_module_runs_and_explains_itself():
