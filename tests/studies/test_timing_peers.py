@@ -15,7 +15,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from guidance import PAPER_LANDER, Lander, Plan, PlanStatus, State, solve_pdg
+from guidance import PAPER_LANDER, Lander, Limits, Plan, PlanStatus, State, solve_pdg
 from guidance.convex.clarabel_solver import SolveStatus
 from guidance.convex.constraint_set import ConstraintSet
 from guidance.convex.programme import ConvexSolution, ConvexTemplate, convex_template
@@ -103,7 +103,7 @@ def test_a_task_asks_nobody_else() -> None:
 @given(STARTS)
 def test_the_cones_alone_give_the_plan_of_solve_pdg(start: LandingProblem) -> None:
     """Without its proofs, fallbacks and flights: these change no plan that needs none of them."""
-    full = solve_pdg(start.state, start.target, gravity=GRAVITY, nodes=31, throw=False)
+    full = solve_pdg(start.state, start.target, gravity=GRAVITY, nodes=31, method="convex", throw=False)
     bare = plan_clarabel(start, 31)
     assert full.status is bare.status is PlanStatus.OPTIMAL
     assert bare.propellant == pytest.approx(full.propellant, abs=0.02)
@@ -183,13 +183,13 @@ def answer_of(plan: Plan, **changes: Any) -> str:
 
 
 def test_a_case_is_told_in_si_from_the_target() -> None:
-    told = json.loads(write_case(problem(LIMITED, glide_slope_limit=1.0, speed_limit=70.0), 30, None))
+    told = json.loads(write_case(problem(LIMITED, limits=Limits(glide_slope=1.0, speed=70.0)), 30, None))
     assert told["position"] == [150.0, 100.0, 890.0]
     assert told["free"] is True
     assert told["time_of_flight"] == pytest.approx(first_time(problem(LIMITED)))
     limits = (told["least_thrust"], told["pointing_cosine"], told["glide_slope"], told["speed_limit"])
     assert limits == pytest.approx((800.0, math.cos(0.6), math.tan(1.0), 70.0))
-    bare = json.loads(write_case(problem(glide_slope_limit=math.pi / 2), 30, 31.0))
+    bare = json.loads(write_case(problem(limits=Limits(glide_slope=math.pi / 2)), 30, 31.0))
     names = ("least_thrust", "pointing_cosine", "glide_slope", "speed_limit")
     assert [bare[name] for name in names] == [None] * 4
     assert (bare["free"], bare["time_of_flight"]) == (False, 31.0)
