@@ -15,7 +15,7 @@
 #include <math.h>
 
 #define POINTS 8         /* of a quadrature */
-#define LEGS 6           /* parts of an arc in a checked path */
+#define LEGS 12          /* parts of an arc in a checked path */
 #define NODES (3 * LEGS + 1)
 #define ANGLES 4         /* of the seven numbers of a step: two for each primer; three times follow */
 #define UNKNOWNS 7

@@ -14,7 +14,7 @@ from guidance.arrays import Array
 from guidance.kernel import compile_kernel
 
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(8)
-LEGS = 6
+LEGS = 12
 """Parts of an arc in a flown path."""
 
 

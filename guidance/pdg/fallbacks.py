@@ -125,9 +125,12 @@ def _prove_bound(problem: LandingProblem, trajectory: Trajectory, this_time_alon
 
 
 def _plan_again(request: Request, nodes: int, found: Plan) -> Plan:
-    """The plan that was found once more, on more nodes."""
+    """The plan that was found once more, on more nodes; an exact one, by the method that knows its limits."""
     from guidance.planning.convex_planner import plan_nearest
+    from guidance.planning.indirect_planner import METHOD as INDIRECT
 
+    if found.method == INDIRECT and request.method == "auto":
+        return _plan_convex(replace(request, method="convex", guess=None))
     if found.status is PlanStatus.NEAREST:
         return plan_nearest(request.problem, nodes, request.time_of_flight)
     return plan_by_method(request.finer(nodes, found))

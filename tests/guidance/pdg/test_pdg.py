@@ -513,3 +513,17 @@ def test_free_time_takes_at_most_two_solves():
         free = guidance.solve_pdg(paper_start(rng), TARGET, method="convex")
         assert free.status is PlanStatus.OPTIMAL
         assert 1 <= free.solves <= 2
+
+
+def test_an_exact_flight_that_dips_below_the_site_is_left_to_the_convex_method():
+    """Between two places where the indirect method looks at its limits; flying the plan shows it."""
+    start = [-192.5766, 21.0259, 275.7365, -15.4635, -8.8499, -57.7739, 1192.35335]
+    plan = guidance.solve_pdg(start, TARGET)
+    assert plan.status is PlanStatus.OPTIMAL
+    assert plan.residuals.altitude < 0.2
+    rng, dips = np.random.default_rng(12), []
+    for _ in range(300):
+        plan = guidance.solve_pdg(harsh_start(rng), TARGET, throw=False)
+        if plan.status is PlanStatus.OPTIMAL:
+            dips.append(plan.residuals.altitude)
+    assert max(dips) < 0.2
