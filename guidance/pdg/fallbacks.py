@@ -125,12 +125,9 @@ def _prove_bound(problem: LandingProblem, trajectory: Trajectory, this_time_alon
 
 
 def _plan_again(request: Request, nodes: int, found: Plan) -> Plan:
-    """The plan that was found once more, on more nodes; an exact one, by the method that knows its limits."""
+    """The plan that was found once more, on more nodes."""
     from guidance.planning.convex_planner import plan_nearest
-    from guidance.planning.indirect_planner import METHOD as INDIRECT
 
-    if found.method == INDIRECT and request.method == "auto":
-        return _plan_convex(replace(request, method="convex", guess=None))
     if found.status is PlanStatus.NEAREST:
         return plan_nearest(request.problem, nodes, request.time_of_flight)
     return plan_by_method(request.finer(nodes, found))
@@ -142,7 +139,8 @@ def plan_by_method(request: Request) -> Plan:
         from guidance.planning.indirect_planner import plan_indirect
 
         plan = plan_indirect(request.problem, request.nodes, request.flight)
-        if plan.status.has_flight or request.method == "indirect":
+        kept = plan.status.has_flight and (request.provisional or plan.keeps_limits)
+        if kept or request.method == "indirect":  # a limit may break between the places that it looks at
             return plan
     if request.bounds_first and request.flight is None:
         from guidance.planning.infeasibility import prove_by_dual_bound
