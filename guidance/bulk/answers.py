@@ -14,7 +14,7 @@ from guidance.bulk.sampling import Nodes
 from guidance.bulk.starts import Starts
 from guidance.descent.certificate import Certificate
 from guidance.descent.plan import PlanStatus
-from guidance.flight_time.neighbouring_extremals import new_extremal
+from guidance.flight_time.extremal import new_extremal
 from guidance.lower_bound.proof import certify_cover
 
 STATUSES = tuple(PlanStatus)

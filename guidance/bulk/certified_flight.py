@@ -12,7 +12,7 @@ from guidance.arrays import Array
 from guidance.descent.problem import ROUNDING
 from guidance.flight_time.extremal import Extremal, PrimerProblem, fly_extremal
 from guidance.flight_time.linear_system import dot
-from guidance.flight_time.path_limits import KEPT, POINTING, PathLimits, broken_limit
+from guidance.flight_time.path_limits import KEPT, POINTING, PathLimits, broken_limit, path_limits
 from guidance.flight_time.primer_equations import LEAST_PULL, MOST_PULL, solve_primer
 from guidance.kernel import compile_kernel
 from guidance.lander import Lander
@@ -110,11 +110,7 @@ def vehicle_of(
 ) -> Vehicle:
     """The numbers of a lander and its limits."""
     angle = math.pi if lander.pointing_limit is None else lander.pointing_limit
-    limits = PathLimits(
-        -math.inf if lander.pointing_limit is None else math.cos(angle),
-        math.inf if speed_limit is None else speed_limit,
-        math.inf if glide_slope_limit is None else glide_slope_limit,
-    )
+    limits = path_limits(lander.pointing_limit, speed_limit, glide_slope_limit)
     sine = math.sin(angle) if angle < math.pi else 0.0
     engine = lander.max_thrust, lander.min_thrust, lander.dry_mass, lander.exhaust_velocity
     return Vehicle(*engine, sine, limits, gravity.copy())

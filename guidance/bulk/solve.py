@@ -18,7 +18,7 @@ from guidance.bulk.starts import Starts
 from guidance.constants import MOON_GRAVITY
 from guidance.descent.certificate import Certificate
 from guidance.descent.plan import Plan
-from guidance.flight_time.neighbouring_extremals import new_extremal
+from guidance.flight_time.extremal import new_extremal
 from guidance.flight_time.primer_vector import find_primer_flight
 from guidance.kernel import compile_kernel
 from guidance.lander import PAPER_LANDER, Lander

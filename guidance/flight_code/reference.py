@@ -12,7 +12,7 @@ from guidance.arrays import Array
 from guidance.bulk.certified_flight import Finding, Vehicle, answer_start
 from guidance.bulk.sampling import set_thrust
 from guidance.descent.problem import LARGEST_NUMBER, lies_below
-from guidance.flight_time.neighbouring_extremals import new_extremal
+from guidance.flight_time.extremal import new_extremal
 from guidance.flight_time.path_limits import PathLimits
 
 

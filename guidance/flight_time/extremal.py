@@ -77,11 +77,41 @@ class PrimerPath(NamedTuple):
 
 
 @compile_kernel
+def new_extremal() -> Extremal:
+    """An extremal to be written."""
+    return Extremal(np.empty((2, 3)), np.empty(3))
+
+
+@compile_kernel
+def copy_extremal(x: Extremal, out: Extremal) -> None:
+    """Write an extremal into another."""
+    for axis in range(3):
+        out.primer[0, axis], out.primer[1, axis] = x.primer[0, axis], x.primer[1, axis]
+        out.times[axis] = x.times[axis]
+
+
+@compile_kernel
+def in_unit(problem: PrimerProblem, unit: float) -> PrimerProblem:
+    """A problem in seconds with `unit` seconds as its unit of time."""
+    r, v, g, flow = problem
+    return PrimerProblem(r / (unit * unit), v / unit, g, flow * unit)
+
+
+@compile_kernel
 def set_primer(x: Extremal, time: float, p: Array) -> None:
     """Write the primer vector at a time, shape (3,)."""
     fraction = (time - x.times[0]) / (x.times[1] - x.times[0])
     for axis in range(3):
         p[axis] = x.primer[0, axis] + (x.primer[1, axis] - x.primer[0, axis]) * fraction
+
+
+@compile_kernel
+def set_direction(x: Extremal, time: float, p: Array) -> None:
+    """Write the unit vector of the primer at a time, shape (3,)."""
+    set_primer(x, time, p)
+    size = max(math.sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]), 1e-12)
+    for axis in range(3):
+        p[axis] /= size
 
 
 @compile_kernel
@@ -108,15 +138,13 @@ def fly_extremal(x: Extremal, problem: PrimerProblem) -> PrimerPath:
     ends = np.array([0.0, first, x.times[1], x.times[2]])
     points = 3 * LEGS + 1
     path = PrimerPath(np.empty((points, 3)), np.empty((points, 3)), np.empty((points, 3)))
-    state, p, time, mass = np.empty(6), np.empty(3), 0.0, 1.0
+    state, time, mass = np.empty(6), 0.0, 1.0
     for axis in range(3):
         state[axis], state[3 + axis] = problem.position[axis], problem.velocity[axis]
     for k in range(points):
-        set_primer(x, time, p)
-        size = max(math.sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]), 1e-12)
+        set_direction(x, time, path.direction[k])
         for axis in range(3):
             path.position[k, axis], path.velocity[k, axis] = state[axis], state[3 + axis]
-            path.direction[k, axis] = p[axis] / size
         arc, part = k // LEGS, k % LEGS
         if arc == 3:
             break

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
-from guidance.flight_time.extremal import Extremal, PrimerProblem
-from guidance.flight_time.primer_equations import copy_extremal, solve_from
+from guidance.flight_time.extremal import Extremal, PrimerProblem, copy_extremal, new_extremal
+from guidance.flight_time.primer_equations import solve_from
 from guidance.kernel import compile_kernel
 
 _FARTHEST = 3.0  # ratio of times of flight
@@ -48,7 +46,7 @@ def _solve_near(time: float, problem: PrimerProblem, x: Extremal) -> bool:
     change = time - x.times[2]
     if change == 0.0:
         return True
-    start = Extremal(np.empty((2, 3)), np.empty(3))
+    start = new_extremal()
     copy_extremal(x, start)
     for attempt in range(2):
         if attempt == 1 or x.times[0] <= 0.0:

@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 
 from guidance.arrays import Array
-from guidance.flight_time.extremal import Extremal, PrimerProblem
+from guidance.flight_time.extremal import Extremal, PrimerProblem, copy_extremal, in_unit, new_extremal
 from guidance.flight_time.linear_system import solve_linear
 from guidance.flight_time.primer_equations import ANGLES, move_extremal, residuals, set_jacobian
 from guidance.kernel import compile_kernel
@@ -49,12 +49,6 @@ class Neighbours(NamedTuple):
 
 
 @compile_kernel
-def new_extremal() -> Extremal:
-    """An extremal to be written."""
-    return Extremal(np.empty((2, 3)), np.empty(3))
-
-
-@compile_kernel
 def _solve_fixed(jacobian: Array, right: Array, unit: float, step: Array) -> None:
     """Write the step, in seconds, that takes the six equations to -right; none where they are singular."""
     matrix, vector = np.empty((_FIXED, _FIXED)), np.empty(_FIXED)
@@ -72,8 +66,7 @@ def _solve_fixed(jacobian: Array, right: Array, unit: float, step: Array) -> Non
 def find_neighbours(extremal: Extremal, problem: PrimerProblem) -> Neighbours:
     """Neighbours of an extremal, or of nearly one, of a problem; both in seconds as in `solve_primer`."""
     unit = extremal.times[2]
-    r, v, g, flow = problem
-    scaled = PrimerProblem(r / (unit * unit), v / unit, g, flow * unit)
+    scaled = in_unit(problem, unit)
     x = Extremal(extremal.primer, extremal.times / unit)
     here, frame, jacobian = np.empty(7), np.empty((4, 3)), np.empty((7, 7))
     residuals(x, scaled, here)
@@ -89,7 +82,7 @@ def find_neighbours(extremal: Extremal, problem: PrimerProblem) -> Neighbours:
         rate[k] /= unit
     rate[_FIXED] = 1.0
     kept = new_extremal()
-    kept.primer[:], kept.times[:] = extremal.primer, extremal.times
+    copy_extremal(extremal, kept)
     return Neighbours(kept, frame, correction, rate)
 
 

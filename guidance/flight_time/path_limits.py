@@ -26,6 +26,17 @@ class PathLimits(NamedTuple):
     glide_slope: float
 
 
+def path_limits(
+    pointing: float | None = None, speed: float | None = None, glide_slope: float | None = None
+) -> PathLimits:
+    """Limits [rad, m/s, rad] as numbers; None for none."""
+    return PathLimits(
+        -math.inf if pointing is None else math.cos(pointing),
+        math.inf if speed is None else speed,
+        math.inf if glide_slope is None else glide_slope,
+    )
+
+
 @compile_kernel
 def broken_limit(path: PrimerPath, limits: PathLimits, unit: float) -> int:
     """The first limit that a path breaks at its nodes: POINTING, ALTITUDE, SPEED, GLIDE_SLOPE; else KEPT.

@@ -22,7 +22,15 @@ import math
 import numpy as np
 
 from guidance.arrays import Array
-from guidance.flight_time.extremal import Burn, Extremal, PrimerProblem, add_burn
+from guidance.flight_time.extremal import (
+    Burn,
+    Extremal,
+    PrimerProblem,
+    add_burn,
+    copy_extremal,
+    in_unit,
+    new_extremal,
+)
 from guidance.flight_time.linear_system import dot, solve_linear
 from guidance.kernel import compile_kernel
 
@@ -72,14 +80,6 @@ def move_extremal(x: Extremal, frame: Array, step: Array, out: Extremal) -> None
             out.primer[k, axis] /= math.sqrt(size)
     for k in range(3):
         out.times[k] = x.times[k] + step[ANGLES + k]
-
-
-@compile_kernel
-def copy_extremal(x: Extremal, out: Extremal) -> None:
-    """Write an extremal into another."""
-    for axis in range(3):
-        out.primer[0, axis], out.primer[1, axis] = x.primer[0, axis], x.primer[1, axis]
-        out.times[axis] = x.times[axis]
 
 
 @compile_kernel
@@ -167,7 +167,7 @@ def _newton_step(
 @compile_kernel
 def _newton(x: Extremal, problem: PrimerProblem, size: int) -> bool:
     """Damped Newton, in place, on the first `size` unknowns and equations; whether it converged."""
-    frame, step, trial = np.empty((4, 3)), np.zeros(7), Extremal(np.empty((2, 3)), np.empty(3))
+    frame, step, trial = np.empty((4, 3)), np.zeros(7), new_extremal()
     here, there = np.empty(7), np.empty(7)
     if not _admitted(x, problem.mass_flow):
         return False
@@ -251,11 +251,10 @@ def solve_from(x: Extremal, problem: PrimerProblem, size: int) -> bool:
         problem: in seconds.
         size: 7; or 6 to hold the time of flight, where the Hamiltonian need not vanish.
     """
-    r, v, g, flow = problem
     unit = x.times[2]
     for k in range(3):
         x.times[k] /= unit
-    found = _newton(x, PrimerProblem(r / (unit * unit), v / unit, g, flow * unit), size)
+    found = _newton(x, in_unit(problem, unit), size)
     for k in range(3):
         x.times[k] *= unit
     return found

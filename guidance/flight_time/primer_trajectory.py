@@ -10,8 +10,8 @@ import numpy as np
 from guidance.arrays import Array
 from guidance.descent.problem import LandingProblem
 from guidance.descent.trajectory import Trajectory
-from guidance.flight_time.extremal import Burn, Extremal, PrimerProblem, add_burn, set_primer
-from guidance.flight_time.primer_vector import PrimerFlight
+from guidance.flight_time.extremal import Burn, Extremal, PrimerProblem, add_burn, set_direction
+from guidance.flight_time.primer_vector import PrimerFlight, scale_landing
 from guidance.kernel import compile_kernel
 
 _SLIVER = 1e-9
@@ -43,9 +43,7 @@ class PrimerTrajectory(Trajectory):
 
     def mass_at(self, time: Array) -> Array:
         """[kg] shape (k,), exact; as `Trajectory.mass_at`."""
-        flight, times = self.flight, np.asarray(time, dtype=np.float64)
-        burning = np.minimum(times, flight.first_burn) + np.maximum(times - flight.braking, 0.0)
-        return self.mass[0] * (1.0 - flight.burn_rate * burning)
+        return self.mass[0] * (1.0 - self.flight.burnt_at(np.asarray(time, dtype=np.float64)))
 
     def sample_thrust(self, parts: int) -> Array:
         """[N] thrust within the intervals, shape (N - 1, parts + 1, 3); as `Trajectory.sample_thrust`."""
@@ -69,10 +67,7 @@ def lay_nodes(problem: LandingProblem, flight: PrimerFlight, nodes: int) -> Prim
     lander, state, extremal = problem.lander, problem.state, flight.extremal
     times = _node_times(extremal, nodes)
     scale = lander.max_thrust / state.mass
-    scaled = PrimerProblem(
-        problem.offset / scale, state.velocity / scale, problem.gravity / scale, flight.burn_rate
-    )
-    states = _states(extremal, scaled, times)
+    states = _states(extremal, scale_landing(problem), times)
     position, velocity = problem.target + scale * states[:, :3], scale * states[:, 3:6]
     position[0], velocity[0] = state.position, state.velocity
     thrust, mass = _thrust(extremal, lander.max_thrust, times), state.mass * states[:, 6]
@@ -108,21 +103,12 @@ def _burning(x: Extremal, time: float) -> bool:
 
 
 @compile_kernel
-def _set_thrust(x: Extremal, time: float, out: Array) -> None:
-    """Unit vector of the primer, shape (3,)."""
-    set_primer(x, time, out)
-    size = max(math.sqrt(out[0] * out[0] + out[1] * out[1] + out[2] * out[2]), 1e-12)
-    for axis in range(3):
-        out[axis] /= size
-
-
-@compile_kernel
 def _thrust(x: Extremal, max_thrust: float, times: Array) -> Array:
     """[N] shape (k, 3)."""
     out = np.zeros((times.size, 3))
     for k in range(times.size):
         if _burning(x, times[k]):
-            _set_thrust(x, times[k], out[k])
+            set_direction(x, times[k], out[k])
             out[k] *= max_thrust
     return out
 
@@ -136,7 +122,7 @@ def _sample(x: Extremal, max_thrust: float, times: Array, out: Array) -> None:
         burning = _burning(x, 0.5 * (times[k] + times[k + 1]))
         for part in range(parts + 1):
             if burning:
-                _set_thrust(x, times[k] + part * step, out[k, part])
+                set_direction(x, times[k] + part * step, out[k, part])
                 out[k, part] *= max_thrust
             else:
                 out[k, part] = 0.0

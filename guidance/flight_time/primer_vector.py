@@ -12,8 +12,9 @@ import numpy as np
 
 from guidance.arrays import Array
 from guidance.descent.problem import LandingProblem
-from guidance.flight_time.extremal import LEGS, Extremal, PrimerPath, PrimerProblem, fly_extremal
+from guidance.flight_time.extremal import Extremal, PrimerPath, PrimerProblem, fly_extremal, new_extremal
 from guidance.flight_time.fixed_time import solve_primer_at
+from guidance.flight_time.path_limits import broken_limit, path_limits
 from guidance.flight_time.primer_equations import solve_primer
 
 
@@ -37,11 +38,14 @@ class PrimerFlight:
     primer: Array
     primer_times: tuple[float, float]
 
+    def burnt_at(self, times: Array) -> Array:
+        """Share of the start mass that is burnt at times [s] of the flight, shape (k,)."""
+        burning = np.minimum(times, self.first_burn) + np.maximum(times - self.braking, 0.0)
+        return self.burn_rate * burning
+
     def log_mass(self, nodes: int) -> Array:
         """ln(m / m_start) at N equal steps, shape (N,)."""
-        times = np.linspace(0.0, self.time, nodes)
-        burning = np.minimum(times, self.first_burn) + np.maximum(times - self.braking, 0.0)
-        return np.log1p(-self.burn_rate * burning)
+        return np.log1p(-self.burnt_at(np.linspace(0.0, self.time, nodes)))
 
     @property
     def log_mass_ratio(self) -> float:
@@ -58,6 +62,13 @@ class PrimerFlight:
         begin, end = self.primer_times
         p = self.primer[0] + (self.primer[1] - self.primer[0]) * ((time - begin) / (end - begin))
         return p / np.linalg.norm(p)
+
+
+def scale_landing(problem: LandingProblem) -> PrimerProblem:
+    """A landing problem in seconds: lengths over full thrust by start mass."""
+    lander, state = problem.lander, problem.state
+    unit, flow = lander.max_thrust / state.mass, lander.max_mass_flow / state.mass
+    return PrimerProblem(problem.offset / unit, state.velocity / unit, problem.gravity / unit, flow)
 
 
 def find_primer_flight(problem: LandingProblem, time: float | None = None) -> PrimerFlight | None:
@@ -78,41 +89,22 @@ def find_primer_flight(problem: LandingProblem, time: float | None = None) -> Pr
         return None
     if problem.limits.thrust_rate is not None:
         return None
-    unit = lander.max_thrust / mass
-    scaled = PrimerProblem(
-        problem.offset / unit,
-        problem.state.velocity / unit,
-        problem.gravity / unit,
-        lander.max_mass_flow / mass,
-    )
-    x = Extremal(np.empty((2, 3)), np.empty(3))
+    scaled, x = scale_landing(problem), new_extremal()
     if not solve_primer(scaled, x) or (time is not None and not solve_primer_at(time, scaled, x)):
         return None
     t1, t2, final = (float(time) for time in x.times)
     flight = PrimerFlight(max(t1, 0.0), t2, final, scaled.mass_flow, x.primer, (t1, t2))
     if flight.log_mass_ratio > problem.log_mass_ratio:
         return None
-    return flight if _keeps_limits(problem, fly_extremal(x, scaled), unit) else None
+    return flight if _keeps_limits(problem, fly_extremal(x, scaled), lander.max_thrust / mass) else None
 
 
 def _keeps_limits(problem: LandingProblem, path: PrimerPath, unit: float) -> bool:
     """Whether a flown path, in units of the acceleration `unit` and seconds, keeps every limit."""
-    position = unit * path.position[:-1]
-    height = position[:, 2]
-    if height.min() < -1e-6 * np.abs(position).max():
+    limits = problem.limits
+    if broken_limit(path, path_limits(problem.lander.pointing_limit, limits.speed, limits.glide_slope), unit):
         return False
-    limit, speed, glide = problem.lander.pointing_limit, problem.speed_limit, problem.glide_slope_limit
-    if limit is not None:
-        burning = np.r_[0 : LEGS + 1, 2 * LEGS : 3 * LEGS + 1]
-        if path.direction[burning, 2].min() < math.cos(limit):
-            return False
-    if speed is not None and (path.velocity**2).sum(axis=1).max() > (speed / unit) ** 2:
-        return False
-    final = problem.limits.final_thrust_direction
+    final, sight = limits.final_thrust_direction, limits.line_of_sight
     if final is not None and final.excess(path.direction[-1]) > 0.0:
         return False
-    sight = problem.limits.line_of_sight
-    if sight is not None and sight.outside(position).max() > 0.0:
-        return False
-    across = np.hypot(position[:, 0], position[:, 1])
-    return glide is None or bool((across * math.cos(glide) <= height * math.sin(glide)).all())
+    return sight is None or not sight.outside(unit * path.position[:-1]).max() > 0.0

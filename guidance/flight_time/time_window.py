@@ -9,7 +9,7 @@ import numpy as np
 
 from guidance.arrays import Array
 from guidance.descent.problem import ROUNDING, LandingProblem
-from guidance.flight_time.ground_contact import find_ground_contact
+from guidance.flight_time.ground_contact import GroundContact, find_ground_contact
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ def _hull(polynomials: list[Array], low: float, high: float) -> TimeWindow:
     return TimeWindow(float(edges[good[0]]), float(edges[good[-1] + 1]))
 
 
-def _broken_at_ends(problem: LandingProblem, free_landing_point: bool) -> str:
+def _broken_at_ends(problem: LandingProblem, free_landing_point: bool, contact: GroundContact | None) -> str:
     """The limit that start and target velocity break by themselves, by more than rounding; empty if none."""
     limit, w, still = problem.speed_bound, problem.target_velocity, problem.speed_rounding
     speed = max(float(np.linalg.norm(problem.state.velocity)), float(np.linalg.norm(w)))
@@ -111,8 +111,9 @@ def _broken_at_ends(problem: LandingProblem, free_landing_point: bool) -> str:
         leaves = not free_landing_point and sight.outside(-w) > still
         if leaves or sight.outside(problem.offset) > ROUNDING * max(1.0, distance):
             return "line of sight"
-    arrival = min(0.0, float(w[2]))
-    return _too_fast(problem) if _speed_at_contact_squared(problem) > arrival * arrival else ""
+    if contact is None or contact.sink <= -float(w[2]):
+        return ""
+    return _too_fast(problem)
 
 
 def _lift(problem: LandingProblem) -> float:
@@ -125,35 +126,27 @@ def _too_fast(problem: LandingProblem) -> str:
     return "altitude" if _lift(problem) > 0.0 else "maximum thrust"
 
 
-def _speed_at_contact_squared(problem: LandingProblem) -> float:
-    """[m^2/s^2] least squared speed of sink at the target's altitude; not above zero where it can stop."""
-    if problem.rotates:  # what pulls at it is not gravity alone
-        return 0.0
-    contact = find_ground_contact(problem)
-    if contact is not None:
-        return contact.sink**2
-    sink, height = -float(problem.state.velocity[2]), float(problem.offset[2])
-    return sink * sink - 2.0 * _lift(problem) * height if sink > problem.speed_rounding else 0.0
+def _latest_contact(problem: LandingProblem) -> GroundContact | None:
+    """Where a start too fast to stop meets the target's altitude at the latest; None where it may stop.
 
-
-def _latest_contact(problem: LandingProblem) -> float:
-    """[s] latest time at which a start too fast to stop meets the target's altitude; inf where it can stop.
-
-    The flight has to end by then: full thrust straight up keeps it above the ground for the longest.
+    By full thrust straight up; where that does not lift the vehicle at first, by the lift of the dry one.
     """
     contact = find_ground_contact(problem)
-    if contact is not None:
-        return contact.time
-    square = _speed_at_contact_squared(problem)
+    sink, height = -float(problem.state.velocity[2]), float(problem.offset[2])
+    if contact is not None or problem.rotates or not sink > problem.speed_rounding:
+        return contact
+    square = sink * sink - 2.0 * _lift(problem) * height
     if square <= 0.0:
-        return math.inf
-    return 2.0 * float(problem.offset[2]) / (math.sqrt(square) - float(problem.state.velocity[2]))
+        return None
+    slowed = math.sqrt(square)
+    return GroundContact(2.0 * height / (slowed + sink), slowed)
 
 
 def forbidden_by(problem: LandingProblem, time: float, free_landing_point: bool = False) -> str:
     """The limit by which start and target velocity alone forbid a flight of `time` [s]; empty if none."""
-    broken = _broken_at_ends(problem, free_landing_point)
-    return broken or (_too_fast(problem) if time > (1.0 + ROUNDING) * _latest_contact(problem) else "")
+    contact = _latest_contact(problem)
+    late = contact is not None and time > (1.0 + ROUNDING) * contact.time
+    return _broken_at_ends(problem, free_landing_point, contact) or (_too_fast(problem) if late else "")
 
 
 def _crossing_time(problem: LandingProblem, thrust_acceleration: float) -> float:
@@ -179,7 +172,8 @@ def time_window(problem: LandingProblem, free_landing_point: bool = False) -> Ti
     Returns:
         The window; empty, with its cause, where these bounds already forbid every flight.
     """
-    broken = _broken_at_ends(problem, free_landing_point)
+    contact = _latest_contact(problem)
+    broken = _broken_at_ends(problem, free_landing_point, contact)
     if broken:
         return replace(_NO_TIME, cause=broken)
     lander, state = problem.lander, problem.state
@@ -194,14 +188,14 @@ def time_window(problem: LandingProblem, free_landing_point: bool = False) -> Ti
     if lander.min_thrust > 0.0:
         high = min(high, (state.mass - lander.dry_mass) * lander.exhaust_velocity / lander.min_thrust)
     limits = _necessary(problem, free_landing_point)
-    low, contact = 1e-3 * engine_time, _latest_contact(problem)
-    window = _hull(limits["maximum thrust"] + limits["propellant"], low, min(high, contact))
+    low, latest = 1e-3 * engine_time, math.inf if contact is None else contact.time
+    window = _hull(limits["maximum thrust"] + limits["propellant"], low, min(high, latest))
     if problem.rotates:
         around = TimeWindow(0.5 * window.low, 2.0 * window.high)
         return TimeWindow(low, high) if window.empty else around
     if not window.empty:
         return window
-    if contact < high and not _hull(limits["maximum thrust"] + limits["propellant"], low, high).empty:
+    if latest < high and not _hull(limits["maximum thrust"] + limits["propellant"], low, high).empty:
         return replace(window, cause="altitude")
     alone = [name for name, parts in limits.items() if _hull(parts, low, high).empty]
     return replace(window, cause=" and ".join(alone or limits))

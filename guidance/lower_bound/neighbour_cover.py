@@ -12,12 +12,11 @@ import math
 import numpy as np
 
 from guidance.arrays import Array, Index
-from guidance.flight_time.extremal import Extremal, PrimerProblem
+from guidance.flight_time.extremal import Extremal, PrimerProblem, new_extremal
 from guidance.flight_time.neighbouring_extremals import (
     Neighbours,
     find_neighbours,
     neighbours_at,
-    new_extremal,
     set_neighbour,
 )
 from guidance.kernel import compile_kernel

@@ -130,7 +130,10 @@ def _plan_again(request: Request, nodes: int, found: Plan) -> Plan:
 
     if found.status is PlanStatus.NEAREST:
         return plan_nearest(request.problem, nodes, request.time_of_flight)
-    return plan_by_method(request.finer(nodes, found))
+    finer = request.finer(nodes, found)
+    if request.method in ("auto", "convex"):  # only the cones are on a mesh, and there is a flight
+        return _plan_convex(finer)
+    return plan_by_method(finer)
 
 
 def plan_by_method(request: Request) -> Plan:

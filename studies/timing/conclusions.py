@@ -88,16 +88,19 @@ def conclude(methods: Sequence[Method], calls: Sequence[Call], summaries: Sequen
     return words
 
 
+def _labels(methods: Sequence[Method], free: bool) -> dict[str, str]:
+    """Name of each method with free or fixed time of flight -> its label; of several meshes, the last."""
+    return {method.name: method.label for method in methods if method.free is free}
+
+
 def _qoco_against_clarabel(
     starts: Sequence[Call], calls: Sequence[Call], summaries: dict[str, Summary], methods: Sequence[Method]
 ) -> list[str]:
     """The two conic solvers on the same programmes: time on the drawn starts, plans on all cases."""
     words = []
     for free in (True, False):
-        labels = {
-            m.name: m.label for m in methods if m.free is free and m.name in (QOCO_METHOD, CLARABEL_METHOD)
-        }
-        if len(labels) < 2:
+        labels = _labels(methods, free)
+        if not {QOCO_METHOD, CLARABEL_METHOD} <= labels.keys():
             continue
         qoco, clarabel = labels[QOCO_METHOD], labels[CLARABEL_METHOD]
         found = compare_methods(starts, qoco, clarabel)
@@ -155,10 +158,8 @@ def _fatrop_against_ipopt(
     """The two nonlinear solvers on the same programme: time on the drawn starts, plans on all cases."""
     words = []
     for free in (True, False):
-        labels = {
-            m.name: m.label for m in methods if m.free is free and m.name in (FATROP_METHOD, IPOPT_METHOD)
-        }
-        if len(labels) < 2:
+        labels = _labels(methods, free)
+        if not {FATROP_METHOD, IPOPT_METHOD} <= labels.keys():
             continue
         ipopt, fatrop = labels[IPOPT_METHOD], labels[FATROP_METHOD]
         found = compare_methods(starts, ipopt, fatrop)

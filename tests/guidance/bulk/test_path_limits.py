@@ -10,8 +10,7 @@ from guidance import PAPER_LANDER, State
 from guidance.bulk.certified_flight import Finding, answer_start, vehicle_of
 from guidance.descent.limits import Limits
 from guidance.descent.problem import LandingProblem
-from guidance.flight_time.extremal import LEGS, PrimerPath
-from guidance.flight_time.neighbouring_extremals import new_extremal
+from guidance.flight_time.extremal import LEGS, PrimerPath, new_extremal
 from guidance.flight_time.path_limits import (
     ALTITUDE,
     GLIDE_SLOPE,

@@ -9,8 +9,7 @@ from scipy.integrate import solve_ivp
 
 from guidance import PAPER_LANDER, State
 from guidance.descent.problem import LandingProblem
-from guidance.flight_time.extremal import PrimerProblem
-from guidance.flight_time.neighbouring_extremals import new_extremal
+from guidance.flight_time.extremal import PrimerProblem, new_extremal
 from guidance.flight_time.primer_equations import solve_primer
 from guidance.lower_bound.dual_case import dual_case
 from guidance.lower_bound.neighbour_cover import bound_by_neighbours, primer_of
