@@ -30,6 +30,7 @@ RUNS: dict[str, tuple[list[str], list[str]]] = {
         ["plan.png"],
     ),
     "hda.belief_statistics": (["--tiles", "1"], []),
+    "hda.flight.film": (["--step", "5", "--width", "300", "--out", "flight.gif"], ["flight.gif"]),
     "hda.terrain": (["--size", "200", "--show", "tile.png"], ["tile.png"]),
     "rl.figures": (["gains", "--out", "gains.png"], ["gains.png"]),
     "rl.train": (
