@@ -33,6 +33,7 @@ RUNS: dict[str, tuple[list[str], list[str]]] = {
     "hda.flight.film": (["--step", "5", "--width", "300", "--out", "flight.gif"], ["flight.gif"]),
     "hda.terrain": (["--size", "200", "--show", "tile.png"], ["tile.png"]),
     "rl.figures": (["gains", "--out", "gains.png"], ["gains.png"]),
+    "rl.model_cards": (["--out", "cards.md"], ["cards.md"]),
     "rl.train": (
         ["td3", "--steps", "40", "--validate-every", "20", "--validation-episodes", "2", "--out", "run"],
         ["run/run.json", "run/validation.csv"],

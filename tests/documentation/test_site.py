@@ -16,7 +16,7 @@ import guidance
 import hda
 import rl
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ("guidance", "hda", "rl", "studies")
 
 
@@ -69,7 +69,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
         shutil.copytree(
             ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__", "*.safetensors")
         )
-    for name in ("mkdocs.yml", "CONTRIBUTING.md", "SECURITY.md"):
+    for name in ("mkdocs.yml", "CHANGELOG.md", "CONTRIBUTING.md", "SECURITY.md"):
         shutil.copy(ROOT / name, folder / name)
     # a proxy that nobody answers at: whatever asks the network fails
     closed = dict.fromkeys(("http_proxy", "https_proxy", "HTTP_PROXY", "HTTPS_PROXY"), "http://127.0.0.1:9")
@@ -101,20 +101,20 @@ def test_pages_load_nothing_from_elsewhere_and_links_lead_somewhere(site: Path) 
 @pytest.mark.slow
 def test_reference_holds_every_public_name(site: Path) -> None:
     for package in (guidance, hda, rl):
-        names = Page(site / "api" / f"{package.__name__}.html").names
+        names = Page(site / "reference" / f"{package.__name__}.html").names
         missing = [name for name in package.__all__ if f"{package.__name__}.{name}" not in names]
         assert missing == []
-    private = [name for path in (site / "api").glob("*.html") for name in Page(path).names if "._" in name]
+    private = [name for path in (site / "reference").glob("*.html") for name in Page(path).names if "._" in name]
     assert private == []
 
 
 @pytest.mark.slow
 def test_every_formula_is_drawn(site: Path) -> None:
     """Each formula of the sources is a MathML element without a command that was not understood."""
-    for source in (ROOT / "docs").glob("*.md"):
+    for source in (ROOT / "docs").rglob("*.md"):
         text = re.sub(r"^```.*?^```", "", source.read_text(), flags=re.DOTALL | re.MULTILINE)
         written = len(re.findall(r"\$\$.+?\$\$|\$[^$]+\$", text, re.DOTALL))
-        built = site / f"{source.stem}.html"
+        built = (site / source.relative_to(ROOT / "docs")).with_suffix(".html")
         assert Page(built).formulas == written, source.name
         for formula in re.findall(r"<math.*?</math>", built.read_text(), re.DOTALL):
             assert re.search(r"\\|&#x0005C;|&amp;", formula) is None, f"{source.name}: {formula}"
