@@ -104,7 +104,9 @@ def test_reference_holds_every_public_name(site: Path) -> None:
         names = Page(site / "reference" / f"{package.__name__}.html").names
         missing = [name for name in package.__all__ if f"{package.__name__}.{name}" not in names]
         assert missing == []
-    private = [name for path in (site / "reference").glob("*.html") for name in Page(path).names if "._" in name]
+    private = [
+        name for path in (site / "reference").glob("*.html") for name in Page(path).names if "._" in name
+    ]
     assert private == []
 
 
