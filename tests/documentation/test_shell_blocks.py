@@ -27,8 +27,8 @@ SHORTER = {
         "python -m rl.train export --name first --runs runs/first --averages 1 --candidates 2 --episodes 2"
         " --validation-episodes 2 --out runs"
     ),
-    "python -m studies.compare --policies my_agent:AGENT td3 single-divert --episodes 200 --out results/agent": (
-        "python -m studies.compare --policies my_agent:AGENT td3 single-divert --episodes 2 --out results/agent"
+    "python -m studies.compare --policies my_agent:AGENT td3 single-divert --episodes 200 --out mine": (
+        "python -m studies.compare --policies my_agent:AGENT td3 single-divert --episodes 2 --out mine"
     ),
 }
 """Line of a page -> what is run in its place: the same, with fewer steps or episodes."""
