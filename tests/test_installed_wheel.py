@@ -166,6 +166,19 @@ def test_the_wheel_holds_the_packages_and_their_data_and_nothing_else(installati
     assert sorted(names) == sorted(tracked)
 
 
+def test_the_one_command_is_installed(installation: Installation) -> None:
+    """As a file beside the interpreter, which its spawned workers read too."""
+    launcher = str(installation.python.with_name("lunar-hda"))
+    call = "import subprocess, sys; sys.exit(subprocess.call(sys.argv[1:]))"
+    explained = installation.run("-c", call, launcher, "--help")
+    assert explained.returncode == 0, explained.stderr
+    assert "lunar-hda COMMAND" in explained.stdout
+    flown = ["compare", "--episodes", "20", "--workers", "2", "--policies", "no-divert", "--no-report"]
+    done = installation.run("-c", call, launcher, *flown, "--out", "launched")
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert (installation.place / "launched" / "table.csv").stat().st_size > 0
+
+
 @pytest.mark.parametrize("command", RUNS)
 def test_an_installed_command_explains_itself(installation: Installation, command: str) -> None:
     done = installation.run("-m", command, "--help")
