@@ -56,8 +56,8 @@ def describe_models() -> str:
         ArtefactError: a card is damaged.
     """
     summaries = {entry.name: entry.summary for entry in entries()}
-    names = [path.stem for path in sorted(WEIGHTS_FOLDER.glob("*.json")) if path.stem != ENCODER]
-    parts = [_HEAD, *(_describe_agent(name, summaries[name]) for name in names), _describe_encoder()]
+    shipped = {name: text for name, text in summaries.items() if (WEIGHTS_FOLDER / f"{name}.json").exists()}
+    parts = [_HEAD, *(_describe_agent(name, text) for name, text in shipped.items()), _describe_encoder()]
     return "\n".join(parts)
 
 
