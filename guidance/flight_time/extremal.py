@@ -117,17 +117,21 @@ def set_direction(x: Extremal, time: float, p: Array) -> None:
 @compile_kernel
 def add_burn(x: Extremal, burn: Burn, mass_flow: float, then: float, out: Array) -> None:
     """Add to out = (r, v), at the time `then`, what a burn contributes; Gauss-Legendre quadrature."""
-    half = 0.5 * (burn.end - burn.begin)
-    p = np.empty(3)
-    for k in range(_POINTS.size):
+    half, begin, span = 0.5 * (burn.end - burn.begin), x.times[0], x.times[1] - x.times[0]
+    ax, ay, az = x.primer[0, 0], x.primer[0, 1], x.primer[0, 2]
+    bx, by, bz = x.primer[1, 0] - ax, x.primer[1, 1] - ay, x.primer[1, 2] - az
+    rx, ry, rz, vx, vy, vz = out[0], out[1], out[2], out[3], out[4], out[5]
+    for k in range(_POINTS.size):  # in scalars: several times faster than in small arrays
         elapsed = half * (1.0 + _POINTS[k])
-        set_primer(x, burn.begin + elapsed, p)
-        size = math.sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2])
+        fraction = (burn.begin + elapsed - begin) / span
+        px, py, pz = ax + bx * fraction, ay + by * fraction, az + bz * fraction
+        size = math.sqrt(px * px + py * py + pz * pz)
         impulse = half * _WEIGHTS[k] / ((burn.mass - mass_flow * elapsed) * max(size, 1e-12))
-        for axis in range(3):
-            gain = impulse * p[axis]
-            out[3 + axis] += gain
-            out[axis] += gain * (then - burn.begin - elapsed)
+        gx, gy, gz = impulse * px, impulse * py, impulse * pz
+        left = then - burn.begin - elapsed
+        rx, ry, rz = rx + gx * left, ry + gy * left, rz + gz * left
+        vx, vy, vz = vx + gx, vy + gy, vz + gz
+    out[0], out[1], out[2], out[3], out[4], out[5] = rx, ry, rz, vx, vy, vz
 
 
 @compile_kernel

@@ -64,15 +64,13 @@ def lay_nodes(problem: LandingProblem, flight: PrimerFlight, nodes: int) -> Prim
         flight: the flight.
         nodes: N, shared among the arcs by their durations; two for each arc at least.
     """
-    lander, state, extremal = problem.lander, problem.state, flight.extremal
-    times = _node_times(extremal, nodes)
-    scale = lander.max_thrust / state.mass
-    states = _states(extremal, scale_landing(problem), times)
-    position, velocity = problem.target + scale * states[:, :3], scale * states[:, 3:6]
+    lander, state = problem.lander, problem.state
+    laid = _lay(flight.extremal, scale_landing(problem), nodes, lander.max_thrust, state.mass)
+    time, position, velocity, mass, thrust = laid
+    position += problem.target
     position[0], velocity[0] = state.position, state.velocity
-    thrust, mass = _thrust(extremal, lander.max_thrust, times), state.mass * states[:, 6]
     return PrimerTrajectory(
-        times, position, velocity, mass, thrust, lander.exhaust_velocity, flight, lander.max_thrust
+        time, position, velocity, mass, thrust, lander.exhaust_velocity, flight, lander.max_thrust
     )
 
 
@@ -105,27 +103,34 @@ def _burning(x: Extremal, time: float) -> bool:
 @compile_kernel
 def _thrust(x: Extremal, max_thrust: float, times: Array) -> Array:
     """[N] shape (k, 3)."""
-    out = np.zeros((times.size, 3))
+    out, direction = np.zeros((times.size, 3)), np.empty(3)
     for k in range(times.size):
         if _burning(x, times[k]):
-            set_direction(x, times[k], out[k])
-            out[k] *= max_thrust
+            set_direction(x, times[k], direction)
+            for axis in range(3):
+                out[k, axis] = max_thrust * direction[axis]
     return out
 
 
 @compile_kernel
 def _sample(x: Extremal, max_thrust: float, times: Array, out: Array) -> None:
     """Write the thrust [N] within each interval to `out`, shape (N - 1, parts + 1, 3)."""
-    parts = out.shape[1] - 1
+    parts, first = out.shape[1] - 1, x.primer[0]
+    turn = (x.primer[1] - first) / (x.times[1] - x.times[0])
     for k in range(times.size - 1):
         step = (times[k + 1] - times[k]) / parts
-        burning = _burning(x, 0.5 * (times[k] + times[k + 1]))
+        if not _burning(x, 0.5 * (times[k] + times[k + 1])):
+            out[k] = 0.0
+            continue
         for part in range(parts + 1):
-            if burning:
-                set_direction(x, times[k] + part * step, out[k, part])
-                out[k, part] *= max_thrust
-            else:
-                out[k, part] = 0.0
+            since = times[k] + part * step - x.times[0]
+            east, north, up = (
+                first[0] + turn[0] * since,
+                first[1] + turn[1] * since,
+                first[2] + turn[2] * since,
+            )
+            scale = max_thrust / max(math.sqrt(east * east + north * north + up * up), 1e-12)
+            out[k, part, 0], out[k, part, 1], out[k, part, 2] = scale * east, scale * north, scale * up
 
 
 @compile_kernel
@@ -158,3 +163,19 @@ def _states(x: Extremal, problem: PrimerProblem, times: Array) -> Array:
         advance_extremal(x, problem, time, times[k], state)
         out[k], time = state, times[k]
     return out
+
+
+@compile_kernel
+def _lay(
+    x: Extremal, problem: PrimerProblem, nodes: int, max_thrust: float, start_mass: float
+) -> tuple[Array, Array, Array, Array, Array]:
+    """Time, position as seen from the target, velocity, mass and thrust at the nodes, in SI."""
+    time = _node_times(x, nodes)
+    states, thrust = _states(x, problem, time), _thrust(x, max_thrust, time)
+    position, velocity, mass = np.empty((time.size, 3)), np.empty((time.size, 3)), np.empty(time.size)
+    scale = max_thrust / start_mass
+    for k in range(time.size):
+        for axis in range(3):
+            position[k, axis], velocity[k, axis] = scale * states[k, axis], scale * states[k, 3 + axis]
+        mass[k] = start_mass * states[k, 6]
+    return time, position, velocity, mass, thrust

@@ -85,14 +85,14 @@ def find_primer_flight(problem: LandingProblem, time: float | None = None) -> Pr
         problem: the method knows none.
     """
     lander, mass = problem.lander, problem.state.mass
-    if lander.min_thrust > 0.0 or problem.target_velocity.any() or problem.rotates:
+    if lander.min_thrust > 0.0 or not problem.ends_at_rest or problem.rotates:
         return None
     if problem.limits.thrust_rate is not None:
         return None
     scaled, x = scale_landing(problem), new_extremal()
     if not solve_primer(scaled, x) or (time is not None and not solve_primer_at(time, scaled, x)):
         return None
-    t1, t2, final = (float(time) for time in x.times)
+    t1, t2, final = x.times.tolist()
     flight = PrimerFlight(max(t1, 0.0), t2, final, scaled.mass_flow, x.primer, (t1, t2))
     if flight.log_mass_ratio > problem.log_mass_ratio:
         return None

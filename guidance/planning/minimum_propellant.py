@@ -42,7 +42,7 @@ class _Search:
         There it has kinks too where burns meet the nodes of a coarse mesh. In a frame that turns, or with a
         price on the landing error, it is not known either.
         """
-        unknown = task.problem.target_velocity.any() or task.problem.rotates or task.error_price > 0.0
+        unknown = not task.problem.ends_at_rest or task.problem.rotates or task.error_price > 0.0
         return cls(BracketSearch, 20.0) if unknown else cls(TimeSearch, 2.0)
 
 
