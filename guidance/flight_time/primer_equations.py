@@ -31,13 +31,12 @@ from guidance.flight_time.extremal import (
     in_unit,
     new_extremal,
 )
+from guidance.flight_time.first_guess import guess_impulses, guess_suicide_burn
 from guidance.flight_time.linear_system import dot, solve_linear
 from guidance.kernel import compile_kernel
 
 _MOST_STEPS = 30
 _CONVERGED = 1e-10  # largest residual, non-dimensional: a micrometre on the paper's descents
-_LATEST_FIRST_BURN = 0.5  # of the time before the braking burn, in a first guess
-_UNIT = 1e-6  # by which the square of a unit vector may differ from one
 LEAST_PULL, MOST_PULL = 1e-6, 0.98
 """Between these lies the square of gravity over full thrust per start mass."""
 ANGLES = 4
@@ -199,50 +198,6 @@ def _newton(x: Extremal, problem: PrimerProblem, size: int) -> bool:
 
 
 @compile_kernel
-def _guess(problem: PrimerProblem, first_burn: bool, x: Extremal) -> bool:
-    """First guess: a suicide burn along the vertical, and two sideways impulses, at the start and in it.
-
-    Without the sideways impulse at the start (`first_burn` False) the primer comes from below.
-
-    Returns:
-        Whether there is one: next to the target's plane a primer may be too long for floating point.
-    """
-    r, v, gravity, _ = problem
-    g = math.sqrt(dot(gravity, gravity))
-    up = -gravity / g
-    height, climb = dot(r, up), dot(v, up)
-    coast = (2.0 * (1.0 - g) * height - climb * climb) / 2.0
-    ignition_speed = math.sqrt(max(climb * climb + 2.0 * g * coast, 1e-6 * g * abs(height)))
-    t2 = max((ignition_speed + climb) / g, 1e-2 * ignition_speed / g)
-    final = t2 + ignition_speed / (1.0 - g)
-    across = (r - height * up) / (0.5 * (t2 + final))
-    kick = -across - (v - climb * up)
-    size = math.sqrt(dot(kick, kick))
-    q2 = across + (ignition_speed + g * (final - t2)) * up
-    q2 /= math.sqrt(dot(q2, q2))
-    t1 = min(t2 - 2.0 * ignition_speed / g, -1e-3 * t2)
-    if first_burn and size > 1e-9 * ignition_speed:
-        t1 = size if size < 0.8 * t2 else _LATEST_FIRST_BURN * t2
-        speed = v + kick
-        sine, cosine = 1.0, 0.0
-        for _ in range(5):  # the Hamiltonian at t1
-            gap = dot(speed, up) - g * (t2 - t1)
-            if gap == 0.0:
-                break
-            cosine = (dot(q2, speed) - sine * dot(kick, speed) / size) / gap
-            cosine = min(max(cosine, -0.95), 0.95)
-            sine = math.sqrt(1.0 - cosine * cosine)
-        q1 = sine * kick / size + cosine * up
-    else:
-        q1 = 0.1 * kick / ignition_speed - up
-        q1 /= math.sqrt(dot(q1, q1))
-    for axis in range(3):
-        x.primer[0, axis], x.primer[1, axis] = q1[axis], q2[axis]
-    x.times[0], x.times[1], x.times[2] = t1, t2, final
-    return abs(dot(q1, q1) - 1.0) < _UNIT and abs(dot(q2, q2) - 1.0) < _UNIT
-
-
-@compile_kernel
 def solve_from(x: Extremal, problem: PrimerProblem, size: int) -> bool:
     """Newton from a guess, with the time of flight of the guess as unit of time.
 
@@ -275,8 +230,6 @@ def solve_primer(problem: PrimerProblem, x: Extremal) -> bool:
     if not LEAST_PULL < dot(g, g) < MOST_PULL or not dot(r, g) < 0.0:
         return False
     for attempt in range(2):
-        if not _guess(problem, attempt == 0, x):
-            continue
-        if solve_from(x, problem, 7):
+        if guess_suicide_burn(problem, attempt == 0, x) and solve_from(x, problem, 7):
             return True
-    return False
+    return guess_impulses(problem, x) and solve_from(x, problem, 7)
