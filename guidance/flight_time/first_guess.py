@@ -17,6 +17,8 @@ from guidance.kernel import compile_kernel
 _LATEST_FIRST_BURN = 0.5  # of the time before the braking burn, of a suicide burn's guess
 _LATEST_IMPULSE = 0.9  # the same of two impulses
 _UNIT = 1e-6  # by which the square of a unit vector may differ from one
+_LEAST_HEIGHT = 1e-3  # of the start, above the ground, at a touch
+_KINK = 10.0  # jump of the primer's slope at a touch, in primers over the time until then
 _TIMES = 40  # of flight, tried for two impulses
 _SHORTEST = 0.01  # of the longest time tried
 
@@ -113,4 +115,25 @@ def guess_impulses(problem: PrimerProblem, x: Extremal) -> bool:
     final = best + 0.5 * (kick + brake)
     braking = final - brake
     x.times[0], x.times[1], x.times[2] = min(kick, _LATEST_IMPULSE * braking), braking, final
+    return True
+
+
+@compile_kernel
+def guess_touch(problem: PrimerProblem, x: Extremal) -> bool:
+    """Stop the fall at the ground by thrust straight up, and go on from there by two impulses.
+
+    Returns:
+        Whether there is one: the start must sink.
+    """
+    r, v, g, flow = problem
+    if not v[2] < 0.0 or not g[2] > -1.0:
+        return False
+    stop = -v[2] / (1.0 + g[2])
+    place, speed = r + v * stop, v.copy()
+    place[2], speed[2] = _LEAST_HEIGHT * r[2], 0.0
+    if not guess_impulses(PrimerProblem(place, speed, g, flow), x):
+        return False
+    for k in range(3):
+        x.times[k] += stop
+    x.touch[0], x.touch[1], x.touch[2] = stop, _KINK / stop, 0.0
     return True

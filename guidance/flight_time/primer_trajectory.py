@@ -10,7 +10,7 @@ import numpy as np
 from guidance.arrays import Array
 from guidance.descent.problem import LandingProblem
 from guidance.descent.trajectory import Trajectory
-from guidance.flight_time.extremal import Burn, Extremal, PrimerProblem, add_burn, set_direction
+from guidance.flight_time.extremal import Burn, Extremal, PrimerProblem, add_burn, set_direction, touches
 from guidance.flight_time.primer_vector import PrimerFlight, scale_landing
 from guidance.kernel import compile_kernel
 
@@ -76,22 +76,34 @@ def lay_nodes(problem: LandingProblem, flight: PrimerFlight, nodes: int) -> Prim
 
 @compile_kernel
 def _node_times(x: Extremal, nodes: int) -> Array:
-    """[s] the nodes of every arc, from the start to the end."""
-    final, begin, share, laid = x.times[2], 0.0, 0.0, 0
-    arcs = 3 if x.times[0] > 0.0 else 2
-    free = max(nodes - 2 * arcs, 0)
-    out = np.empty(2 * arcs + free)
-    for k in range(3 - arcs, 3):
-        end = x.times[k]
+    """[s] the nodes of every arc, from the start to the end.
+
+    A touch of the ground, where the thrust goes on, is one node; a switch of the engine is two.
+    """
+    final, share, laid, arcs = x.times[2], 0.0, 0, 0
+    ends = np.empty(4)
+    for k in range(-1, 3):
+        end = x.touch[0] if k < 0 else x.times[k]
+        if end > 0.0:
+            ends[arcs] = end
+            arcs += 1
+    touched = touches(x)
+    fewest = 2 * arcs - (1 if touched else 0)
+    free, begin = max(nodes - fewest, 0), 0.0
+    out = np.empty(fewest + free + 1)
+    for arc in range(arcs):
+        end = ends[arc]
         before = round(share)
         share += free * (end - max(begin, 0.0)) / final
-        count = 2 + (free if k == 2 else round(share)) - before
+        count = 2 + (free if arc == arcs - 1 else round(share)) - before
         for node in range(count):
             out[laid + node] = begin + (end - begin) * node / (count - 1)
         laid += count
         out[laid - 1] = end
         begin = end + _SLIVER * final
-    return out
+        if touched and arc == 0:
+            laid, begin = laid - 1, end
+    return out[:laid]
 
 
 @compile_kernel
@@ -123,12 +135,12 @@ def _sample(x: Extremal, max_thrust: float, times: Array, out: Array) -> None:
             out[k] = 0.0
             continue
         for part in range(parts + 1):
-            since = times[k] + part * step - x.times[0]
-            east, north, up = (
-                first[0] + turn[0] * since,
-                first[1] + turn[1] * since,
-                first[2] + turn[2] * since,
-            )
+            time = times[k] + part * step
+            since = time - x.times[0]
+            east, north = first[0] + turn[0] * since, first[1] + turn[1] * since
+            up = first[2] + turn[2] * since
+            if time < x.touch[0]:
+                up += x.touch[1] * (x.touch[0] - time)
             scale = max_thrust / max(math.sqrt(east * east + north * north + up * up), 1e-12)
             out[k, part, 0], out[k, part, 1], out[k, part, 2] = scale * east, scale * north, scale * up
 
