@@ -13,7 +13,7 @@ MINIMUM := .venv-minimum
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help setup lint test test-all test-minimum compare bench results-check docs clean
+.PHONY: help setup lint test test-all test-minimum compare demo bench results-check docs clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-13s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -37,6 +37,9 @@ test-minimum: $(MINIMUM)/.installed  ## the fast tests, on the least versions of
 
 compare: $(VENV)/.installed  ## fly every policy on the same episodes and print the table
 	$(BIN)/python -m studies.compare --resume $(ARGS)
+
+demo: $(VENV)/.installed  ## a first result: 100 episodes, six policies, and the report on your screen
+	$(BIN)/python -m studies.compare --quick $(ARGS)
 
 bench: $(VENV)/.installed  ## measure the speed of the inner loops
 	$(BIN)/python -m studies.bench $(ARGS)

@@ -7,12 +7,11 @@ which stands in the file once. The tables read the columns of the files (`COLUMN
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from studies.campaign.executor import OpenExecutor
 from studies.campaign.monte_carlo import Study
 from studies.campaign.score import MEASURE_COLUMNS
 from studies.columns import Column, Output, Row, standing_in
@@ -23,7 +22,7 @@ from studies.compare.charts import (
     line_style,
 )
 from studies.compare.differences import DIFFERENCE_COLUMNS, PairedDifference
-from studies.compare.flights import FlightPicture, choose_flights, fly_pictures, picture_ground
+from studies.compare.flights import FlightPicture, picture_ground
 from studies.compare.scores import StudyScores
 from studies.compare.table import COLUMNS, REFERENCE_POLICY, PolicySummary, paper_line
 from studies.paper import PAPER_ROWS
@@ -63,29 +62,6 @@ class Cell:
     value: str
     text: str
     ranges: tuple[str, ...] = ()
-
-
-def fly_report_flights(
-    content: ReportContent, open_executor: OpenExecutor, folder: Path, on_progress: Callable[[int, int], None]
-) -> list[FlightPicture]:
-    """Fly again the episodes that the report shows; their whole flights go to `folder` as NPZ.
-
-    Args:
-        content: scores and study.
-        open_executor: makes the executor that flies them.
-        folder: for the NPZ files.
-        on_progress: called with (flights done, flights in all).
-    """
-    chosen = choose_flights(content.scores, content.study.policies)
-    done = 0
-
-    def advance() -> None:
-        nonlocal done
-        done += 1
-        on_progress(done, len(chosen))
-
-    with open_executor() as executor:
-        return fly_pictures(content.study, chosen, executor, folder, advance)
 
 
 def write_report(path: Path, content: ReportContent, flights: Sequence[FlightPicture]) -> None:
