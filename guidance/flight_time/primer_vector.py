@@ -41,10 +41,12 @@ class PrimerFlight:
     Attributes:
         extremal: its arcs and its primer, in seconds, as the kernels read it.
         burn_rate: [1/s] share of the start mass burnt per second at full thrust.
+        broken: the first limit of the problem that it breaks, as of `path_limits`; KEPT for none.
     """
 
     extremal: Extremal
     burn_rate: float
+    broken: int = KEPT
 
     @cached_property
     def first_burn(self) -> float:
@@ -104,17 +106,28 @@ def find_primer_flight(problem: LandingProblem, time: float | None = None) -> Pr
         vanishes, where no coast is left between the burns, or where the flight breaks a limit of the
         problem: the method knows none but a touch of the ground, and that for the best time alone.
     """
+    flight = find_extremal_flight(problem, time)
+    return None if flight is None or flight.broken else flight
+
+
+def find_extremal_flight(problem: LandingProblem, time: float | None = None) -> PrimerFlight | None:
+    """The same, and a flight too that breaks a limit of the problem or overdraws the tank: it says which."""
     lander = problem.lander
     if lander.min_thrust > 0.0 or not problem.ends_at_rest or problem.rotates:
         return None
     if problem.limits.thrust_rate is not None:
         return None
     scaled, x = scale_landing(problem), new_extremal()
-    found = solve_primer(scaled, x) and (time is None or solve_primer_at(time, scaled, x))
-    broken = _broken_limit(problem, scaled, x) if found else ALTITUDE
-    if broken == ALTITUDE and time is None and find_ground_contact(problem) is None:
-        broken = _broken_limit(problem, scaled, x) if solve_touching(scaled, x) else ALTITUDE
-    return None if broken else PrimerFlight(x, scaled.mass_flow)
+    flight = None
+    if solve_primer(scaled, x) and (time is None or solve_primer_at(time, scaled, x)):
+        flight = PrimerFlight(x, scaled.mass_flow, _broken_limit(problem, scaled, x))
+        if flight.broken != ALTITUDE:
+            return flight
+    if time is None and find_ground_contact(problem) is None:
+        x = new_extremal()
+        if solve_touching(scaled, x):
+            return PrimerFlight(x, scaled.mass_flow, _broken_limit(problem, scaled, x))
+    return flight
 
 
 def _broken_limit(problem: LandingProblem, scaled: PrimerProblem, x: Extremal) -> int:
