@@ -1,55 +1,16 @@
 "use strict";
+// The episode browser: one flight, and another of the same episode beside it.
 (function () {
-  const read = (id) => JSON.parse(document.getElementById(id).textContent);
+  const { read, later, config } = Report;
   const element = (id) => document.getElementById(id);
-  const charts = read("charts-data");
-  const grounds = read("grounds-data");
-  const colors = read("colors-data");
-  const config = { responsive: true, displaylogo: false, displayModeBar: false };
+  const grounds = read("grounds-data"), opening = read("opening-data");
   const blue = "#0072B2", vermilion = "#D55E00", green = "#009E73", purple = "#CC79A7", orange = "#E69F00";
   const safeness = [[0, "#4d4d4d"], [1, "#e8e8e8"]];
-
-  // Charts are drawn when they come near the screen, and before printing.
-  const waiting = new Map();
-  const watcher = new IntersectionObserver((entries) => {
-    for (const entry of entries) if (entry.isIntersecting) draw(entry.target);
-  }, { rootMargin: "300px" });
-  function later(node, make) { waiting.set(node, make); watcher.observe(node); }
-  function draw(node) {
-    const make = waiting.get(node);
-    if (!make) return;
-    waiting.delete(node);
-    watcher.unobserve(node);
-    make();
-  }
-  window.addEventListener("beforeprint", () => { for (const node of [...waiting.keys()]) draw(node); });
-
-  for (const node of document.querySelectorAll("[data-chart]")) {
-    const figure = charts[node.dataset.chart];
-    later(node, () => {
-      if (figure.layout.height) node.style.height = figure.layout.height + "px";
-      Plotly.newPlot(node, figure.data, figure.layout, config).then(() => {
-        if (node.dataset.chart.startsWith("histogram")) hideTraces(node);
-      });
-    });
-  }
-  const legend = [...document.querySelectorAll("#legend button")];
-  function hideTraces(node) {
-    Plotly.restyle(node, { visible: legend.map((button) => button.getAttribute("aria-pressed") === "true") });
-  }
-  for (const button of legend) {
-    button.addEventListener("click", () => {
-      button.setAttribute("aria-pressed", String(button.getAttribute("aria-pressed") !== "true"));
-      for (const node of document.querySelectorAll('[data-chart^="histogram"]')) if (node.data) hideTraces(node);
-    });
-  }
-
-  // The episode browser.
   const flights = [...document.querySelectorAll("script.flight")].map((node) => ({
     policy: node.dataset.policy, episode: Number(node.dataset.episode), ending: node.dataset.ending,
     words: node.dataset.words, node,
   }));
-  const policySelect = element("policy"), episodeSelect = element("episode"), look = element("look");
+  const policySelect = element("policy"), episodeSelect = element("episode"), besideSelect = element("beside"), look = element("look");
   if (!flights.length) return;
 
   function bytes(text) { return Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0)); }
@@ -99,9 +60,14 @@
       traces.push({ type: "scatter3d", mode: "lines", x: line.x, y: line.y, z: line.x.map(() => plane + 1), line: { color: orange, width: 3 }, hoverinfo: "skip", showlegend: false });
     }
     traces.push({
-      type: "scatter3d", mode: "lines", x: data.x, y: data.y, z: data.z, line: { color: vermilion, width: 6 }, name: "flight",
+      type: "scatter3d", mode: "lines", x: data.x, y: data.y, z: data.z, line: { color: vermilion, width: 6 }, name: flight.policy,
       text: data.time.map((t, k) => t + " s, " + data.speed[k] + " m/s"), hovertemplate: "%{text}<br>%{z} m<extra></extra>",
     });
+    if (beside) {
+      const other = dataOf(beside), x = other.touchdown[0], y = other.touchdown[1];
+      traces.push({ type: "scatter3d", mode: "lines", x: other.x, y: other.y, z: other.z, line: { color: green, width: 4 }, name: beside.policy, hoverinfo: "name" });
+      traces.push({ type: "scatter3d", mode: "markers", x: [x], y: [y], z: [plane + 1], marker: { color: green, size: 6, symbol: "diamond" }, showlegend: false, hoverinfo: "skip" });
+    }
     const sites = [data.nominal, ...data.decisions.map((decision) => [...decision.site, plane])];
     traces.push({ type: "scatter3d", mode: "lines+markers", x: sites.map((s) => s[0]), y: sites.map((s) => s[1]), z: sites.map(() => plane + 1), line: { color: blue, width: 2 }, marker: { color: blue, size: 3 }, name: "targets" });
     traces.push({ type: "scatter3d", mode: "markers", x: [data.touchdown[0]], y: [data.touchdown[1]], z: [plane + 1], marker: { color: purple, size: 7, symbol: "diamond" }, name: "touchdown" });
@@ -123,10 +89,16 @@
       traces.push({ type: "scatter", mode: "lines", x: line.x, y: line.y, line: { color: orange, width: index === k ? 3 : 1 }, hoverinfo: "skip", showlegend: false });
     });
     const sites = [data.nominal, ...data.decisions.map((decision) => decision.site)];
-    traces.push({ type: "scatter", mode: "lines", x: data.x, y: data.y, line: { color: vermilion, width: 2 }, name: "flight", hoverinfo: "skip" });
+    traces.push({ type: "scatter", mode: "lines", x: data.x, y: data.y, line: { color: vermilion, width: 2 }, name: flight.policy, hoverinfo: "skip" });
+    if (beside) {
+      const other = dataOf(beside);
+      traces.push({ type: "scatter", mode: "lines", x: other.x, y: other.y, line: { color: green, width: 2, dash: "dash" }, name: beside.policy, hoverinfo: "skip" });
+      traces.push({ type: "scatter", mode: "markers", x: [other.touchdown[0]], y: [other.touchdown[1]], marker: { color: green, size: 13, symbol: "star", line: { color: "#000", width: 1 } }, showlegend: false });
+    }
     traces.push({ type: "scatter", mode: "lines+markers", x: sites.map((s) => s[0]), y: sites.map((s) => s[1]), line: { color: blue, width: 1 }, marker: { color: blue, size: 7 }, name: "targets" });
     traces.push({ type: "scatter", mode: "markers", x: [data.touchdown[0]], y: [data.touchdown[1]], marker: { color: purple, size: 15, symbol: "star", line: { color: "#000", width: 1 } }, name: "touchdown" });
-    const reach = Math.max(105, half * 1.05), [x, y] = data.looks[0].target;
+    const [x, y] = data.looks[0].target, landed = [data, ...(beside ? [dataOf(beside)] : [])].map((each) => each.touchdown);
+    const reach = Math.max(105, half * 1.05, ...landed.map((place) => 15 + Math.max(Math.abs(place[0] - x), Math.abs(place[1] - y))));
     Plotly.react(element("flight-map"), traces, {
       margin: { l: 56, r: 8, t: 8, b: 44 }, font, legend: { orientation: "h", y: -0.16 }, plot_bgcolor: "#777",
       xaxis: { title: { text: "east [m]" }, range: [x - reach, x + reach], showgrid: false, zeroline: false },
@@ -137,20 +109,27 @@
   }
 
   function drawTime(flight) {
-    const data = dataOf(flight), color = colors[flight.policy], end = data.time[data.time.length - 1];
+    const data = dataOf(flight), color = vermilion, end = data.time[data.time.length - 1];
     const line = (y, values, extra) => Object.assign({ type: "scatter", mode: "lines", x: data.time, y: values, yaxis: y, line: { color, width: 2 }, showlegend: false }, extra);
     const times = [...data.decisions.map((decision) => decision.time), end];
     const gain = (k) => { const values = data.decisions.map((decision) => decision.gains[k]); return [...values, values[values.length - 1]]; };
     const thrust = [...data.thrust, data.thrust[data.thrust.length - 1]];
     const traces = [
-      line("y", data.z), line("y2", data.speed), line("y3", thrust, { line: { color, width: 2, shape: "hv" } }), line("y4", data.mass),
-      line("y5", gain(0), { x: times, line: { color: blue, width: 2, shape: "hv" }, name: "on position", showlegend: true }),
-      line("y5", gain(1), { x: times, line: { color: vermilion, width: 2, shape: "hv", dash: "dash" }, name: "on velocity", showlegend: true }),
+      line("y", data.z, { name: flight.policy, showlegend: Boolean(beside) }), line("y2", data.speed), line("y3", thrust, { line: { color, width: 2, shape: "hv" } }), line("y4", data.mass),
+      line("y5", gain(0), { x: times, line: { color: blue, width: 2, shape: "hv" }, name: "gain on position", showlegend: true }),
+      line("y5", gain(1), { x: times, line: { color: purple, width: 2, shape: "hv", dash: "dot" }, name: "gain on velocity", showlegend: true }),
     ];
+    if (beside) {
+      const other = dataOf(beside), held = [...other.thrust, other.thrust[other.thrust.length - 1]];
+      const style = { color: green, width: 2, dash: "dash" };
+      for (const [y, values, shape] of [["y", other.z, "linear"], ["y2", other.speed, "linear"], ["y3", held, "hv"], ["y4", other.mass, "linear"]]) {
+        traces.push({ type: "scatter", mode: "lines", x: other.time, y: values, yaxis: y, line: Object.assign({ shape }, style), name: beside.policy, showlegend: y === "y" });
+      }
+    }
     const flown = [...new Set(data.decisions.map((decision) => decision.law))].join(", ");
     const panel = (title, from, to) => ({ title: { text: title }, domain: [from, to], zeroline: false, gridcolor: "#ddd", automargin: true });
     Plotly.react(element("flight-time"), traces, {
-      margin: { l: 70, r: 16, t: 8, b: 60 }, font, height: 720, legend: { orientation: "h", y: 0.155, yanchor: "bottom", x: 0.5 },
+      margin: { l: 70, r: 16, t: 60, b: 60 }, font, height: 720, legend: { orientation: "h", y: 1.0, yanchor: "bottom", x: 0 },
       xaxis: { title: { text: "time [s]; lines: looks" }, zeroline: false, gridcolor: "#eee", anchor: "y5" },
       yaxis: panel("altitude [m]", 0.83, 1), yaxis2: panel("speed [m/s]", 0.62, 0.79), yaxis3: panel("thrust [N]", 0.42, 0.58),
       yaxis4: panel("mass [kg]", 0.22, 0.38), yaxis5: panel("gains (" + flown + ")", 0, 0.15),
@@ -158,9 +137,15 @@
     }, config);
   }
 
-  let current = null;
-  function show(flight) {
+  let current = null, beside = null;
+  function show(flight, besidePolicy) {
     current = flight;
+    const same = flights.filter((other) => other.episode === flight.episode && other !== flight);
+    beside = same.find((other) => other.policy === besidePolicy) || null;
+    besideSelect.replaceChildren(new Option("nothing", ""), ...same.map((other) => new Option(other.policy + " \u2013 " + other.ending, other.policy)));
+    besideSelect.value = beside ? beside.policy : "";
+    besideSelect.disabled = !same.length;
+    element("words-beside").textContent = beside ? "Beside it: " + beside.words : "";
     policySelect.value = flight.policy;
     const own = flights.filter((other) => other.policy === flight.policy);
     episodeSelect.replaceChildren(...own.map((other) => new Option(other.episode + " \u2013 " + other.ending, other.episode)));
@@ -178,17 +163,19 @@
   function showHash() {
     const parts = decodeURIComponent(location.hash).match(/^#flight\/(.+)\/(\d+)$/);
     const flight = parts && find(parts[1], Number(parts[2]));
-    if (flight) { show(flight); element("browser").scrollIntoView(); }
+    if (flight) { show(flight, besideSelect.value); element("browser").scrollIntoView(); }
     return Boolean(flight);
   }
   policySelect.replaceChildren(...[...new Set(flights.map((flight) => flight.policy))].map((name) => new Option(name, name)));
-  policySelect.addEventListener("change", () => show(find(policySelect.value, current.episode) || flights.find((flight) => flight.policy === policySelect.value)));
-  episodeSelect.addEventListener("change", () => show(find(policySelect.value, Number(episodeSelect.value))));
-  const step = (by) => show(flights[(flights.indexOf(current) + by + flights.length) % flights.length]);
+  policySelect.addEventListener("change", () => show(find(policySelect.value, current.episode) || flights.find((flight) => flight.policy === policySelect.value), besideSelect.value));
+  episodeSelect.addEventListener("change", () => show(find(policySelect.value, Number(episodeSelect.value)), besideSelect.value));
+  besideSelect.addEventListener("change", () => show(current, besideSelect.value));
+  const step = (by) => show(flights[(flights.indexOf(current) + by + flights.length) % flights.length], besideSelect.value);
   element("previous").addEventListener("click", () => step(-1));
   element("next").addEventListener("click", () => step(1));
   look.addEventListener("input", () => drawMap(current));
   element("controls").addEventListener("submit", (event) => event.preventDefault());
   window.addEventListener("hashchange", showHash);
-  if (!showHash()) show(flights[0]);
+  if (window.innerWidth < 700) element("flights-in-words").open = false;  // a long way to scroll on a phone
+  if (!showHash()) show(find(opening.policy, opening.episode), opening.beside);
 })();
