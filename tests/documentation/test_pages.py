@@ -43,6 +43,12 @@ def run_blocks(page: str, names: dict[str, Any]) -> dict[str, Any]:
     return names
 
 
+def test_git_keeps_every_page() -> None:
+    """One of them under a name that `.gitignore` hides would be missing from every clone."""
+    kept = subprocess.run(["git", "ls-files", "docs"], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert set(WRITTEN) <= set(kept.stdout.splitlines())
+
+
 def test_the_readme_is_short() -> None:
     text = read_page("README.md")
     assert text.count("\n") <= 150
