@@ -20,7 +20,7 @@ def finite_vector(name: str, value: ArrayLike, size: int) -> Array:
         raise ValueError(f"{name} must be {size} numbers, got {value!r}") from error
     if vector.shape != (size,):
         raise ValueError(f"{name} must have shape ({size},), got {vector.shape}")
-    if not np.isfinite(vector).all():
+    if not all(map(math.isfinite, vector.tolist())):
         raise ValueError(f"{name} must be finite, got {vector.tolist()}")
     return vector
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
@@ -75,7 +76,7 @@ class Plan:
         solves: int = 0,
     ) -> Plan:
         """A plan with a flight."""
-        miss = float(np.linalg.norm(trajectory.position[-1, :2] - problem.target[:2]))
+        miss = math.dist(trajectory.position[-1, :2], problem.target[:2])
         return cls(status, problem, method, trajectory, miss, message=status.value, solves=solves)
 
     @property
@@ -182,7 +183,7 @@ class Plan:
         self._demand_flight("cannot be flown")
         return fly_residuals(self.trajectory, self.problem)
 
-    @property
+    @cached_property
     def keeps_limits(self) -> bool:
         """Whether there is a flight and, flown, it lands where it says and keeps every limit.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -25,7 +26,7 @@ _VECTORS = ("target", "gravity", "target_velocity", "angular_velocity")
 def lies_below(start: Array, target: Array) -> bool:
     """Whether a start [m] lies below a target's altitude by more than rounding; both of shape (3,)."""
     depth = float(target[2] - start[2])
-    return depth > 0.0 and depth > ROUNDING * max(1.0, float(np.linalg.norm(start - target)))
+    return depth > 0.0 and depth > ROUNDING * max(1.0, math.dist(start, target))
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,10 +70,10 @@ class LandingProblem:
             raise ValueError(f"lander must be a Lander, got {self.lander!r}")
         if not isinstance(self.limits, Limits):
             raise ValueError(f"limits must be a Limits, got {self.limits!r}")
-        numbers = {name: getattr(self, name) for name in _VECTORS}
-        for name, vector in ({"state": self.state.as_array()} | numbers).items():
-            if np.abs(vector).max() > LARGEST_NUMBER:
-                raise ValueError(f"{name}: no number may exceed {LARGEST_NUMBER:g}, got {vector.tolist()}")
+        state = [*self.state.position.tolist(), *self.state.velocity.tolist(), self.state.mass]
+        for name, values in (("state", state), *((name, getattr(self, name).tolist()) for name in _VECTORS)):
+            if max(map(abs, values)) > LARGEST_NUMBER:
+                raise ValueError(f"{name}: no number may exceed {LARGEST_NUMBER:g}, got {values}")
         if self.state.mass <= self.lander.dry_mass:
             raise ValueError(
                 f"state: mass {self.state.mass:g} kg must exceed the dry mass {self.lander.dry_mass:g} kg"
@@ -98,9 +99,9 @@ class LandingProblem:
         """Whether the glide slope limit says more than the altitude floor does."""
         return self.glide_slope_limit is not None and self.glide_slope_limit < math.pi / 2 - 1e-6
 
-    @property
+    @cached_property
     def offset(self) -> Array:
-        """[m] shape (3,): the start as seen from the target.
+        """[m] shape (3,), read-only: the start as seen from the target.
 
         One that breaks the altitude, the glide slope or the line of sight by no more than rounding is moved
         to keep it.
@@ -109,7 +110,7 @@ class LandingProblem:
         if offset[2] < 0.0:
             offset[2] = 0.0
         outside = self.outside_glide_slope(offset)
-        rounding = ROUNDING * max(1.0, float(np.linalg.norm(offset)))
+        rounding = ROUNDING * max(1.0, math.hypot(*offset))
         if 0.0 < outside <= rounding:
             across, angle = math.hypot(offset[0], offset[1]), self.glide_slope_limit or 0.0
             offset[:2] *= 1.0 - outside * math.cos(angle) / across
@@ -117,6 +118,7 @@ class LandingProblem:
         sight = self.limits.line_of_sight
         if sight is not None and 0.0 < sight.outside(offset) <= rounding:
             offset = sight.on_surface(offset)
+        offset.flags.writeable = False
         return offset
 
     def outside_glide_slope(self, vector: Array) -> float:
@@ -129,7 +131,12 @@ class LandingProblem:
     @property
     def rotates(self) -> bool:
         """Whether the site frame turns."""
-        return bool(self.angular_velocity.any())
+        return any(self.angular_velocity.tolist())
+
+    @property
+    def ends_at_rest(self) -> bool:
+        """Whether the vehicle stops at the target."""
+        return not any(self.target_velocity.tolist())
 
     @property
     def pull_at_target(self) -> Array:
@@ -140,8 +147,8 @@ class LandingProblem:
     @property
     def arrived(self) -> bool:
         """Whether the start is the target, with its velocity, to rounding: no flight is needed."""
-        change = float(np.linalg.norm(self.state.velocity - self.target_velocity))
-        return float(np.linalg.norm(self.offset)) <= ROUNDING and change <= self.speed_rounding
+        near = math.hypot(*self.offset) <= ROUNDING
+        return near and math.dist(self.state.velocity, self.target_velocity) <= self.speed_rounding
 
     @property
     def speed_rounding(self) -> float:

@@ -223,11 +223,11 @@ def final_thrust_excess(thrust: Array, problem: LandingProblem, max_thrust: floa
         problem: what is asked.
         max_thrust: greatest thrust in that unit; that of the lander in newtons unless given.
     """
-    cone, size = problem.limits.final_thrust_direction, np.linalg.norm(thrust, axis=1)
-    most = problem.lander.max_thrust if max_thrust is None else max_thrust
-    if cone is None or size[-1] <= _least_burning(size, most):
+    cone = problem.limits.final_thrust_direction
+    if cone is None:
         return 0.0
-    return cone.excess(thrust[-1])
+    size, most = np.linalg.norm(thrust, axis=1), max_thrust or problem.lander.max_thrust
+    return 0.0 if size[-1] <= _least_burning(size, most) else cone.excess(thrust[-1])
 
 
 def _least_burning(size: Array, max_thrust: float) -> float:
@@ -245,15 +245,16 @@ def _rate_excess(thrust: Array, time: Array, limit: float | None) -> float:
     return max(0.0, float(within.max()) - limit, float(jumps.max()) - limit)
 
 
-def _glide_excess(offset: Array, limit: float | None) -> float:
+def _glide_excess(position: Array, limit: float | None) -> float:
     if limit is None or limit >= math.pi / 2 - 1e-6:
         return 0.0
+    offset = position - position[-1]
     outside = np.linalg.norm(offset[:, :2], axis=1) - math.tan(limit) * offset[:, 2]
     return max(0.0, float(outside.max()))
 
 
-def _sight_excess(offset: Array, cone: Cone | None) -> float:
-    return 0.0 if cone is None else max(0.0, float(cone.outside(offset).max()))
+def _sight_excess(position: Array, target: Array, cone: Cone | None) -> float:
+    return 0.0 if cone is None else max(0.0, float(cone.outside(position - target).max()))
 
 
 def fly_residuals(trajectory: Trajectory, problem: LandingProblem) -> Residuals:
@@ -265,7 +266,7 @@ def fly_residuals(trajectory: Trajectory, problem: LandingProblem) -> Residuals:
     """
     thrust = trajectory.sample_thrust(2 * BETWEEN)
     fine = fly_thrust(trajectory, thrust, problem)
-    lander, end = problem.lander, fine[-1]
+    lander, end, flown = problem.lander, fine[-1], fine[::BETWEEN, :3]
     nodes = trajectory.time, trajectory.position, trajectory.velocity, trajectory.mass
     found = _measure(fine, thrust, nodes, trajectory.exhaust_velocity)
     floor = min(float(problem.target[2]), float(fine[0, 2]))
@@ -282,8 +283,8 @@ def fly_residuals(trajectory: Trajectory, problem: LandingProblem) -> Residuals:
         thrust_rate=_rate_excess(thrust, trajectory.time, problem.limits.thrust_rate),
         pointing=pointing_excess(trajectory.thrust, lander.pointing_limit, lander.max_thrust),
         final_thrust_direction=final_thrust_excess(trajectory.thrust, problem),
-        glide_slope=_glide_excess(fine[::BETWEEN, :3] - end[:3], problem.glide_slope_limit),
-        line_of_sight=_sight_excess(fine[::BETWEEN, :3] - problem.target, problem.limits.line_of_sight),
+        glide_slope=_glide_excess(flown, problem.glide_slope_limit),
+        line_of_sight=_sight_excess(flown, problem.target, problem.limits.line_of_sight),
         altitude=max(0.0, floor - found.lowest),
         speed=max(0.0, found.speed - limit),
         propellant=max(0.0, lander.dry_mass - float(end[6])),

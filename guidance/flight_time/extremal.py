@@ -14,6 +14,7 @@ from guidance.arrays import Array
 from guidance.kernel import compile_kernel
 
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(8)
+_PARTS = 4  # of a burn on each side of a touch: the primer may turn fast there
 LEGS = 12
 """Parts of an arc in a flown path."""
 
@@ -39,13 +40,18 @@ class PrimerProblem(NamedTuple):
 class Extremal(NamedTuple):
     """The seven unknowns: two unit vectors and three times; its arrays are changed in place.
 
+    Where the flight touches the ground in its first burn, two more: the time s of that, and the rate c at
+    which the primer's upward part falls until then beside what is affine, p_z = ... + c (s - t)_+.
+
     Attributes:
         primer: unit vectors q1 and q2 of the primer at the switches, shape (2, 3).
         times: end of the first burn t1, start of the last t2, end of the flight T, shape (3,).
+        touch: s, c and the altitude that is touched, shape (3,); s = -inf where there is no touch.
     """
 
     primer: Array
     times: Array
+    touch: Array
 
 
 class Burn(NamedTuple):
@@ -78,8 +84,20 @@ class PrimerPath(NamedTuple):
 
 @compile_kernel
 def new_extremal() -> Extremal:
-    """An extremal to be written."""
-    return Extremal(np.empty((2, 3)), np.empty(3))
+    """An extremal to be written, without a touch of the ground."""
+    return Extremal(np.empty((2, 3)), np.empty(3), no_touch())
+
+
+@compile_kernel
+def no_touch() -> Array:
+    """Of the ground, as an extremal holds it."""
+    return np.array([-np.inf, 0.0, 0.0])
+
+
+@compile_kernel
+def touches(x: Extremal) -> bool:
+    """Whether the flight touches the ground in its first burn."""
+    return x.touch[0] > -np.inf
 
 
 @compile_kernel
@@ -87,7 +105,7 @@ def copy_extremal(x: Extremal, out: Extremal) -> None:
     """Write an extremal into another."""
     for axis in range(3):
         out.primer[0, axis], out.primer[1, axis] = x.primer[0, axis], x.primer[1, axis]
-        out.times[axis] = x.times[axis]
+        out.times[axis], out.touch[axis] = x.times[axis], x.touch[axis]
 
 
 @compile_kernel
@@ -103,6 +121,8 @@ def set_primer(x: Extremal, time: float, p: Array) -> None:
     fraction = (time - x.times[0]) / (x.times[1] - x.times[0])
     for axis in range(3):
         p[axis] = x.primer[0, axis] + (x.primer[1, axis] - x.primer[0, axis]) * fraction
+    if time < x.touch[0]:
+        p[2] += x.touch[1] * (x.touch[0] - time)
 
 
 @compile_kernel
@@ -116,18 +136,41 @@ def set_direction(x: Extremal, time: float, p: Array) -> None:
 
 @compile_kernel
 def add_burn(x: Extremal, burn: Burn, mass_flow: float, then: float, out: Array) -> None:
-    """Add to out = (r, v), at the time `then`, what a burn contributes; Gauss-Legendre quadrature."""
-    half = 0.5 * (burn.end - burn.begin)
-    p = np.empty(3)
-    for k in range(_POINTS.size):
+    """Add to out = (r, v), at the time `then`, what a burn contributes."""
+    touch = x.touch[0]
+    if not (touches(x) and burn.begin < x.times[0]):
+        _add_smooth_burn(x, burn, mass_flow, then, out)
+        return
+    mark = min(max(touch, burn.begin), burn.end)
+    for begin, end in ((burn.begin, mark), (mark, burn.end)):
+        part = (end - begin) / _PARTS
+        for k in range(_PARTS if part > 0.0 else 0):
+            at = begin + k * part
+            mass = burn.mass - mass_flow * (at - burn.begin)
+            _add_smooth_burn(x, Burn(at, at + part, mass), mass_flow, then, out)
+
+
+@compile_kernel
+def _add_smooth_burn(x: Extremal, burn: Burn, mass_flow: float, then: float, out: Array) -> None:
+    """The same of a burn during which the primer has no kink; Gauss-Legendre quadrature."""
+    half, begin, span = 0.5 * (burn.end - burn.begin), x.times[0], x.times[1] - x.times[0]
+    ax, ay, az = x.primer[0, 0], x.primer[0, 1], x.primer[0, 2]
+    bx, by, bz = x.primer[1, 0] - ax, x.primer[1, 1] - ay, x.primer[1, 2] - az
+    if burn.begin < x.touch[0]:
+        az += x.touch[1] * (x.touch[0] - begin)
+        bz -= x.touch[1] * span
+    rx, ry, rz, vx, vy, vz = out[0], out[1], out[2], out[3], out[4], out[5]
+    for k in range(_POINTS.size):  # in scalars: several times faster than in small arrays
         elapsed = half * (1.0 + _POINTS[k])
-        set_primer(x, burn.begin + elapsed, p)
-        size = math.sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2])
+        fraction = (burn.begin + elapsed - begin) / span
+        px, py, pz = ax + bx * fraction, ay + by * fraction, az + bz * fraction
+        size = math.sqrt(px * px + py * py + pz * pz)
         impulse = half * _WEIGHTS[k] / ((burn.mass - mass_flow * elapsed) * max(size, 1e-12))
-        for axis in range(3):
-            gain = impulse * p[axis]
-            out[3 + axis] += gain
-            out[axis] += gain * (then - burn.begin - elapsed)
+        gx, gy, gz = impulse * px, impulse * py, impulse * pz
+        left = then - burn.begin - elapsed
+        rx, ry, rz = rx + gx * left, ry + gy * left, rz + gz * left
+        vx, vy, vz = vx + gx, vy + gy, vz + gz
+    out[0], out[1], out[2], out[3], out[4], out[5] = rx, ry, rz, vx, vy, vz
 
 
 @compile_kernel

@@ -67,7 +67,7 @@ def find_neighbours(extremal: Extremal, problem: PrimerProblem) -> Neighbours:
     """Neighbours of an extremal, or of nearly one, of a problem; both in seconds as in `solve_primer`."""
     unit = extremal.times[2]
     scaled = in_unit(problem, unit)
-    x = Extremal(extremal.primer, extremal.times / unit)
+    x = Extremal(extremal.primer, extremal.times / unit, extremal.touch)
     here, frame, jacobian = np.empty(7), np.empty((4, 3)), np.empty((7, 7))
     residuals(x, scaled, here)
     set_jacobian(x, scaled, here, frame, new_extremal(), jacobian)

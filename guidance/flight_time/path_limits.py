@@ -8,7 +8,8 @@ from typing import NamedTuple
 from guidance.flight_time.extremal import LEGS, PrimerPath
 from guidance.kernel import compile_kernel
 
-KEPT, POINTING, ALTITUDE, SPEED, GLIDE_SLOPE = range(5)
+KEPT, POINTING, ALTITUDE, SPEED, GLIDE_SLOPE, FINAL_DIRECTION, LINE_OF_SIGHT, PROPELLANT = range(8)
+"""What a flight breaks; the last three are not for compiled code."""
 _BELOW = 1e-6  # of the largest coordinate: rounding, at the target's altitude
 
 

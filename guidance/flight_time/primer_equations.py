@@ -11,8 +11,12 @@ primer be the unit vectors q1 and q2 at the switches t1 and t2. Then
 are seven equations for q1, q2 (two each), t1, t2 and T. Where the flight starts with a coast, they hold with
 a t1 < 0. Since the thrust is known in time, r and v are quadratures.
 
+A flight may touch the ground while its first burn turns it upward. There the primer's slope jumps along the
+vertical (as the costate of the position does where a limit on it binds at one time), and two unknowns, the
+time s of the touch and the jump c, go with two equations, z(s) = v_z(s) = 0.
+
 Source: Lawden, Optimal Trajectories for Space Navigation, 1963; Lu, JGCD 41(4), 2018 (propellant-optimal
-powered descent).
+powered descent); Bryson, Denham and Dreyfus, AIAA Journal 1(11), 1963 (limits on the state).
 """
 
 from __future__ import annotations
@@ -30,23 +34,25 @@ from guidance.flight_time.extremal import (
     copy_extremal,
     in_unit,
     new_extremal,
+    touches,
 )
+from guidance.flight_time.first_guess import guess_impulses, guess_suicide_burn, guess_touch
 from guidance.flight_time.linear_system import dot, solve_linear
 from guidance.kernel import compile_kernel
 
 _MOST_STEPS = 30
 _CONVERGED = 1e-10  # largest residual, non-dimensional: a micrometre on the paper's descents
-_LATEST_FIRST_BURN = 0.5  # of the time before the braking burn, in a first guess
-_UNIT = 1e-6  # by which the square of a unit vector may differ from one
 LEAST_PULL, MOST_PULL = 1e-6, 0.98
 """Between these lies the square of gravity over full thrust per start mass."""
 ANGLES = 4
-"""Of the seven numbers of a step: two for each primer; three times follow."""
+"""Of the numbers of a step: two for each primer; three times follow, then those of a touch."""
+FREE, TOUCHING = 7, 9
+"""Equations and unknowns of a flight, and of one that touches the ground."""
 
 
 @compile_kernel
 def residuals(x: Extremal, problem: PrimerProblem, out: Array) -> None:
-    """Seven equations of the module docstring, all non-dimensional."""
+    """The equations of the module docstring, all non-dimensional; the last two where `out` has room."""
     t1, t2, final = x.times[0], x.times[1], x.times[2]
     r, v, g, flow = problem
     first = max(t1, 0.0)
@@ -64,11 +70,16 @@ def residuals(x: Extremal, problem: PrimerProblem, out: Array) -> None:
         out[axis] = r[axis] + (v[axis] + 0.5 * fall) * final + here[axis]
         out[3 + axis] = v[axis] + fall + here[3 + axis]
     out[6] = hamiltonian
+    if out.size == TOUCHING:
+        touch, up = x.touch[0], np.zeros(6)
+        add_burn(x, Burn(0.0, touch, 1.0), flow, touch, up)
+        out[7] = r[2] + (v[2] + 0.5 * g[2] * touch) * touch + up[2] - x.touch[2]
+        out[8] = v[2] + g[2] * touch + up[5]
 
 
 @compile_kernel
 def move_extremal(x: Extremal, frame: Array, step: Array, out: Extremal) -> None:
-    """Apply a step: two angles of q1 and of q2 in their tangent frames, and the three times."""
+    """Apply a step: two angles of q1 and of q2 in their tangent frames, the times, and those of a touch."""
     for k in range(2):
         size = 0.0
         for axis in range(3):
@@ -80,6 +91,9 @@ def move_extremal(x: Extremal, frame: Array, step: Array, out: Extremal) -> None
             out.primer[k, axis] /= math.sqrt(size)
     for k in range(3):
         out.times[k] = x.times[k] + step[ANGLES + k]
+    if step.size == TOUCHING:
+        out.touch[0], out.touch[1] = x.touch[0] + step[FREE], x.touch[1] + step[FREE + 1]
+        out.touch[2] = x.touch[2]
 
 
 @compile_kernel
@@ -120,6 +134,8 @@ def _length(values: Array) -> float:
 def _admitted(x: Extremal, mass_flow: float) -> bool:
     """Whether the times are in order and mass is left."""
     first = max(x.times[0], 0.0)
+    if touches(x) and not 0.0 < x.touch[0] < first:
+        return False
     return first < x.times[1] < x.times[2] and mass_flow * (first + x.times[2] - x.times[1]) < 0.95
 
 
@@ -127,25 +143,26 @@ def _admitted(x: Extremal, mass_flow: float) -> bool:
 def set_jacobian(
     x: Extremal, problem: PrimerProblem, here: Array, frame: Array, trial: Extremal, jacobian: Array
 ) -> None:
-    """Derivatives of the seven equations by the seven unknowns, from differences.
+    """Derivatives of the equations by the unknowns, from differences.
 
     Args:
         x: where, with a flight of about one unit of time.
         problem: in the same units.
-        here: residuals at x, shape (7,).
+        here: residuals at x, shape (7,), or (9,) with a touch.
         frame: the answer's tangent frames of q1 and q2, shape (4, 3).
         trial: is overwritten.
-        jacobian: the answer, shape (7, 7): a column for each angle of q1 and q2, for t1, t2 and T.
+        jacobian: the answer, as many rows and columns: a column for each angle of q1 and q2, for t1, t2 and
+            T, and for s and c.
     """
-    there, step = np.empty(7), np.zeros(7)
+    there, step = np.empty(here.size), np.zeros(here.size)
     _set_frame(x, frame)
-    for k in range(7):
+    for k in range(here.size):
         step[k] = (
             -1e-7 if k == ANGLES and x.times[0] < 0.0 else 1e-7
         )  # stay on one side of the kink at t1 = 0
         move_extremal(x, frame, step, trial)
         residuals(trial, problem, there)
-        for i in range(7):
+        for i in range(here.size):
             jacobian[i, k] = (there[i] - here[i]) / step[k]
         step[k] = 0.0
 
@@ -155,7 +172,7 @@ def _newton_step(
     x: Extremal, problem: PrimerProblem, here: Array, size: int, frame: Array, trial: Extremal
 ) -> tuple[Array, bool]:
     """Full step towards a root in the first `size` unknowns, from a difference Jacobian; if there is one."""
-    jacobian = np.empty((7, 7))
+    jacobian = np.empty((here.size, here.size))
     set_jacobian(x, problem, here, frame, trial, jacobian)
     full = -here[:size]
     found = solve_linear(jacobian[:size, :size], full)
@@ -167,8 +184,9 @@ def _newton_step(
 @compile_kernel
 def _newton(x: Extremal, problem: PrimerProblem, size: int) -> bool:
     """Damped Newton, in place, on the first `size` unknowns and equations; whether it converged."""
-    frame, step, trial = np.empty((4, 3)), np.zeros(7), new_extremal()
-    here, there = np.empty(7), np.empty(7)
+    count = max(size, FREE)
+    frame, step, trial = np.empty((4, 3)), np.zeros(count), new_extremal()
+    here, there = np.empty(count), np.empty(count)
     if not _admitted(x, problem.mass_flow):
         return False
     residuals(x, problem, here)
@@ -178,7 +196,7 @@ def _newton(x: Extremal, problem: PrimerProblem, size: int) -> bool:
         full, found = _newton_step(x, problem, here, size, frame, trial)
         if not found:
             return False
-        turn, delay = _norm(full[:ANGLES]), _norm(full[ANGLES + 1 :])
+        turn, delay = _norm(full[:ANGLES]), _norm(full[ANGLES + 1 : FREE])
         damping = min(1.0, 0.7 / max(1e-9, turn), 0.5 / max(1e-9, delay))
         before, better = _length(here[:size]), False
         for _ in range(12):
@@ -199,64 +217,22 @@ def _newton(x: Extremal, problem: PrimerProblem, size: int) -> bool:
 
 
 @compile_kernel
-def _guess(problem: PrimerProblem, first_burn: bool, x: Extremal) -> bool:
-    """First guess: a suicide burn along the vertical, and two sideways impulses, at the start and in it.
-
-    Without the sideways impulse at the start (`first_burn` False) the primer comes from below.
-
-    Returns:
-        Whether there is one: next to the target's plane a primer may be too long for floating point.
-    """
-    r, v, gravity, _ = problem
-    g = math.sqrt(dot(gravity, gravity))
-    up = -gravity / g
-    height, climb = dot(r, up), dot(v, up)
-    coast = (2.0 * (1.0 - g) * height - climb * climb) / 2.0
-    ignition_speed = math.sqrt(max(climb * climb + 2.0 * g * coast, 1e-6 * g * abs(height)))
-    t2 = max((ignition_speed + climb) / g, 1e-2 * ignition_speed / g)
-    final = t2 + ignition_speed / (1.0 - g)
-    across = (r - height * up) / (0.5 * (t2 + final))
-    kick = -across - (v - climb * up)
-    size = math.sqrt(dot(kick, kick))
-    q2 = across + (ignition_speed + g * (final - t2)) * up
-    q2 /= math.sqrt(dot(q2, q2))
-    t1 = min(t2 - 2.0 * ignition_speed / g, -1e-3 * t2)
-    if first_burn and size > 1e-9 * ignition_speed:
-        t1 = size if size < 0.8 * t2 else _LATEST_FIRST_BURN * t2
-        speed = v + kick
-        sine, cosine = 1.0, 0.0
-        for _ in range(5):  # the Hamiltonian at t1
-            gap = dot(speed, up) - g * (t2 - t1)
-            if gap == 0.0:
-                break
-            cosine = (dot(q2, speed) - sine * dot(kick, speed) / size) / gap
-            cosine = min(max(cosine, -0.95), 0.95)
-            sine = math.sqrt(1.0 - cosine * cosine)
-        q1 = sine * kick / size + cosine * up
-    else:
-        q1 = 0.1 * kick / ignition_speed - up
-        q1 /= math.sqrt(dot(q1, q1))
-    for axis in range(3):
-        x.primer[0, axis], x.primer[1, axis] = q1[axis], q2[axis]
-    x.times[0], x.times[1], x.times[2] = t1, t2, final
-    return abs(dot(q1, q1) - 1.0) < _UNIT and abs(dot(q2, q2) - 1.0) < _UNIT
-
-
-@compile_kernel
 def solve_from(x: Extremal, problem: PrimerProblem, size: int) -> bool:
     """Newton from a guess, with the time of flight of the guess as unit of time.
 
     Args:
         x: a guess in seconds; the answer.
         problem: in seconds.
-        size: 7; or 6 to hold the time of flight, where the Hamiltonian need not vanish.
+        size: FREE, or TOUCHING; or 6 to hold the time of flight, where the Hamiltonian need not vanish.
     """
     unit = x.times[2]
     for k in range(3):
         x.times[k] /= unit
+    x.touch[0], x.touch[1], x.touch[2] = x.touch[0] / unit, x.touch[1] * unit, x.touch[2] / (unit * unit)
     found = _newton(x, in_unit(problem, unit), size)
     for k in range(3):
         x.times[k] *= unit
+    x.touch[0], x.touch[1], x.touch[2] = x.touch[0] * unit, x.touch[1] / unit, x.touch[2] * (unit * unit)
     return found
 
 
@@ -275,8 +251,23 @@ def solve_primer(problem: PrimerProblem, x: Extremal) -> bool:
     if not LEAST_PULL < dot(g, g) < MOST_PULL or not dot(r, g) < 0.0:
         return False
     for attempt in range(2):
-        if not _guess(problem, attempt == 0, x):
-            continue
-        if solve_from(x, problem, 7):
+        if guess_suicide_burn(problem, attempt == 0, x) and solve_from(x, problem, 7):
             return True
-    return False
+    return guess_impulses(problem, x) and solve_from(x, problem, 7)
+
+
+@compile_kernel
+def solve_touching(problem: PrimerProblem, x: Extremal) -> bool:
+    """Find the extremal that touches the target's altitude in its first burn.
+
+    Args:
+        problem: in seconds, as `PrimerProblem` says.
+        x: the answer, in seconds.
+
+    Returns:
+        Whether it was found, and the ground bends its primer as it may: upward.
+    """
+    pull = problem.gravity
+    if not LEAST_PULL < dot(pull, pull) < MOST_PULL or not guess_touch(problem, x):
+        return False
+    return solve_from(x, problem, TOUCHING) and x.touch[1] > 0.0

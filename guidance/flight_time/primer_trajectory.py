@@ -10,7 +10,7 @@ import numpy as np
 from guidance.arrays import Array
 from guidance.descent.problem import LandingProblem
 from guidance.descent.trajectory import Trajectory
-from guidance.flight_time.extremal import Burn, Extremal, PrimerProblem, add_burn, set_direction
+from guidance.flight_time.extremal import Burn, Extremal, PrimerProblem, add_burn, set_direction, touches
 from guidance.flight_time.primer_vector import PrimerFlight, scale_landing
 from guidance.kernel import compile_kernel
 
@@ -64,36 +64,46 @@ def lay_nodes(problem: LandingProblem, flight: PrimerFlight, nodes: int) -> Prim
         flight: the flight.
         nodes: N, shared among the arcs by their durations; two for each arc at least.
     """
-    lander, state, extremal = problem.lander, problem.state, flight.extremal
-    times = _node_times(extremal, nodes)
-    scale = lander.max_thrust / state.mass
-    states = _states(extremal, scale_landing(problem), times)
-    position, velocity = problem.target + scale * states[:, :3], scale * states[:, 3:6]
+    lander, state = problem.lander, problem.state
+    laid = _lay(flight.extremal, scale_landing(problem), nodes, lander.max_thrust, state.mass)
+    time, position, velocity, mass, thrust = laid
+    position += problem.target
     position[0], velocity[0] = state.position, state.velocity
-    thrust, mass = _thrust(extremal, lander.max_thrust, times), state.mass * states[:, 6]
     return PrimerTrajectory(
-        times, position, velocity, mass, thrust, lander.exhaust_velocity, flight, lander.max_thrust
+        time, position, velocity, mass, thrust, lander.exhaust_velocity, flight, lander.max_thrust
     )
 
 
 @compile_kernel
 def _node_times(x: Extremal, nodes: int) -> Array:
-    """[s] the nodes of every arc, from the start to the end."""
-    final, begin, share, laid = x.times[2], 0.0, 0.0, 0
-    arcs = 3 if x.times[0] > 0.0 else 2
-    free = max(nodes - 2 * arcs, 0)
-    out = np.empty(2 * arcs + free)
-    for k in range(3 - arcs, 3):
-        end = x.times[k]
+    """[s] the nodes of every arc, from the start to the end.
+
+    A touch of the ground, where the thrust goes on, is one node; a switch of the engine is two.
+    """
+    final, share, laid, arcs = x.times[2], 0.0, 0, 0
+    ends = np.empty(4)
+    for k in range(-1, 3):
+        end = x.touch[0] if k < 0 else x.times[k]
+        if end > 0.0:
+            ends[arcs] = end
+            arcs += 1
+    touched = touches(x)
+    fewest = 2 * arcs - (1 if touched else 0)
+    free, begin = max(nodes - fewest, 0), 0.0
+    out = np.empty(fewest + free + 1)
+    for arc in range(arcs):
+        end = ends[arc]
         before = round(share)
         share += free * (end - max(begin, 0.0)) / final
-        count = 2 + (free if k == 2 else round(share)) - before
+        count = 2 + (free if arc == arcs - 1 else round(share)) - before
         for node in range(count):
             out[laid + node] = begin + (end - begin) * node / (count - 1)
         laid += count
         out[laid - 1] = end
         begin = end + _SLIVER * final
-    return out
+        if touched and arc == 0:
+            laid, begin = laid - 1, end
+    return out[:laid]
 
 
 @compile_kernel
@@ -105,27 +115,34 @@ def _burning(x: Extremal, time: float) -> bool:
 @compile_kernel
 def _thrust(x: Extremal, max_thrust: float, times: Array) -> Array:
     """[N] shape (k, 3)."""
-    out = np.zeros((times.size, 3))
+    out, direction = np.zeros((times.size, 3)), np.empty(3)
     for k in range(times.size):
         if _burning(x, times[k]):
-            set_direction(x, times[k], out[k])
-            out[k] *= max_thrust
+            set_direction(x, times[k], direction)
+            for axis in range(3):
+                out[k, axis] = max_thrust * direction[axis]
     return out
 
 
 @compile_kernel
 def _sample(x: Extremal, max_thrust: float, times: Array, out: Array) -> None:
     """Write the thrust [N] within each interval to `out`, shape (N - 1, parts + 1, 3)."""
-    parts = out.shape[1] - 1
+    parts, first = out.shape[1] - 1, x.primer[0]
+    turn = (x.primer[1] - first) / (x.times[1] - x.times[0])
     for k in range(times.size - 1):
         step = (times[k + 1] - times[k]) / parts
-        burning = _burning(x, 0.5 * (times[k] + times[k + 1]))
+        if not _burning(x, 0.5 * (times[k] + times[k + 1])):
+            out[k] = 0.0
+            continue
         for part in range(parts + 1):
-            if burning:
-                set_direction(x, times[k] + part * step, out[k, part])
-                out[k, part] *= max_thrust
-            else:
-                out[k, part] = 0.0
+            time = times[k] + part * step
+            since = time - x.times[0]
+            east, north = first[0] + turn[0] * since, first[1] + turn[1] * since
+            up = first[2] + turn[2] * since
+            if time < x.touch[0]:
+                up += x.touch[1] * (x.touch[0] - time)
+            scale = max_thrust / max(math.sqrt(east * east + north * north + up * up), 1e-12)
+            out[k, part, 0], out[k, part, 1], out[k, part, 2] = scale * east, scale * north, scale * up
 
 
 @compile_kernel
@@ -158,3 +175,19 @@ def _states(x: Extremal, problem: PrimerProblem, times: Array) -> Array:
         advance_extremal(x, problem, time, times[k], state)
         out[k], time = state, times[k]
     return out
+
+
+@compile_kernel
+def _lay(
+    x: Extremal, problem: PrimerProblem, nodes: int, max_thrust: float, start_mass: float
+) -> tuple[Array, Array, Array, Array, Array]:
+    """Time, position as seen from the target, velocity, mass and thrust at the nodes, in SI."""
+    time = _node_times(x, nodes)
+    states, thrust = _states(x, problem, time), _thrust(x, max_thrust, time)
+    position, velocity, mass = np.empty((time.size, 3)), np.empty((time.size, 3)), np.empty(time.size)
+    scale = max_thrust / start_mass
+    for k in range(time.size):
+        for axis in range(3):
+            position[k, axis], velocity[k, axis] = scale * states[k, axis], scale * states[k, 3 + axis]
+        mass[k] = start_mass * states[k, 6]
+    return time, position, velocity, mass, thrust

@@ -7,15 +7,31 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from guidance.arrays import Array
 from guidance.descent.problem import LandingProblem
-from guidance.flight_time.extremal import Extremal, PrimerPath, PrimerProblem, fly_extremal, new_extremal
+from guidance.flight_time.extremal import (
+    Extremal,
+    PrimerProblem,
+    fly_extremal,
+    new_extremal,
+    set_direction,
+)
 from guidance.flight_time.fixed_time import solve_primer_at
-from guidance.flight_time.path_limits import broken_limit, path_limits
-from guidance.flight_time.primer_equations import solve_primer
+from guidance.flight_time.ground_contact import find_ground_contact
+from guidance.flight_time.path_limits import (
+    ALTITUDE,
+    FINAL_DIRECTION,
+    KEPT,
+    LINE_OF_SIGHT,
+    PROPELLANT,
+    broken_limit,
+    path_limits,
+)
+from guidance.flight_time.primer_equations import solve_primer, solve_touching
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,20 +39,29 @@ class PrimerFlight:
     """A flight that meets the necessary conditions of least propellant.
 
     Attributes:
-        first_burn: [s] end of the burn at the start; zero where there is none.
-        braking: [s] start of the last burn.
-        time: [s] time of flight.
+        extremal: its arcs and its primer, in seconds, as the kernels read it.
         burn_rate: [1/s] share of the start mass burnt per second at full thrust.
-        primer: direction of the primer at two times, rows of shape (2, 3); it is affine in time.
-        primer_times: [s] these times; the first may lie before the start.
+        broken: the first limit of the problem that it breaks, as of `path_limits`; KEPT for none.
     """
 
-    first_burn: float
-    braking: float
-    time: float
+    extremal: Extremal
     burn_rate: float
-    primer: Array
-    primer_times: tuple[float, float]
+    broken: int = KEPT
+
+    @cached_property
+    def first_burn(self) -> float:
+        """[s] end of the burn at the start; zero where there is none."""
+        return max(float(self.extremal.times[0]), 0.0)
+
+    @cached_property
+    def braking(self) -> float:
+        """[s] start of the last burn."""
+        return float(self.extremal.times[1])
+
+    @cached_property
+    def time(self) -> float:
+        """[s] time of flight."""
+        return float(self.extremal.times[2])
 
     def burnt_at(self, times: Array) -> Array:
         """Share of the start mass that is burnt at times [s] of the flight, shape (k,)."""
@@ -52,16 +77,11 @@ class PrimerFlight:
         """ln(start mass / final mass)."""
         return -math.log1p(-self.burn_rate * (self.first_burn + self.time - self.braking))
 
-    @property
-    def extremal(self) -> Extremal:
-        """The flight as the kernels read it, in seconds."""
-        return Extremal(self.primer, np.array([self.primer_times[0], self.braking, self.time]))
-
     def direction_at(self, time: float) -> Array:
         """Unit vector of the primer, along which the thrust points; shape (3,)."""
-        begin, end = self.primer_times
-        p = self.primer[0] + (self.primer[1] - self.primer[0]) * ((time - begin) / (end - begin))
-        return p / np.linalg.norm(p)
+        out = np.empty(3)
+        set_direction(self.extremal, time, out)
+        return out
 
 
 def scale_landing(problem: LandingProblem) -> PrimerProblem:
@@ -72,7 +92,9 @@ def scale_landing(problem: LandingProblem) -> PrimerProblem:
 
 
 def find_primer_flight(problem: LandingProblem, time: float | None = None) -> PrimerFlight | None:
-    """Flight of least propellant by the indirect method, in about 0.1 ms.
+    """Flight of least propellant by the indirect method, in some 0.05 ms.
+
+    Where it would cut through the target's altitude in its first burn, the one that touches it there.
 
     Args:
         problem: the landing problem.
@@ -82,29 +104,44 @@ def find_primer_flight(problem: LandingProblem, time: float | None = None) -> Pr
         The flight; None where none was found, where the engine cannot stop or cannot lift the vehicle, where
         the flight does not end at rest, where the frame turns, where the thrust may not jump, where gravity
         vanishes, where no coast is left between the burns, or where the flight breaks a limit of the
-        problem: the method knows none.
+        problem: the method knows none but a touch of the ground, and that for the best time alone.
     """
-    lander, mass = problem.lander, problem.state.mass
-    if lander.min_thrust > 0.0 or problem.target_velocity.any() or problem.rotates:
+    flight = find_extremal_flight(problem, time)
+    return None if flight is None or flight.broken else flight
+
+
+def find_extremal_flight(problem: LandingProblem, time: float | None = None) -> PrimerFlight | None:
+    """The same, and a flight too that breaks a limit of the problem or overdraws the tank: it says which."""
+    lander = problem.lander
+    if lander.min_thrust > 0.0 or not problem.ends_at_rest or problem.rotates:
         return None
     if problem.limits.thrust_rate is not None:
         return None
     scaled, x = scale_landing(problem), new_extremal()
-    if not solve_primer(scaled, x) or (time is not None and not solve_primer_at(time, scaled, x)):
-        return None
-    t1, t2, final = (float(time) for time in x.times)
-    flight = PrimerFlight(max(t1, 0.0), t2, final, scaled.mass_flow, x.primer, (t1, t2))
-    if flight.log_mass_ratio > problem.log_mass_ratio:
-        return None
-    return flight if _keeps_limits(problem, fly_extremal(x, scaled), lander.max_thrust / mass) else None
+    flight = None
+    if solve_primer(scaled, x) and (time is None or solve_primer_at(time, scaled, x)):
+        flight = PrimerFlight(x, scaled.mass_flow, _broken_limit(problem, scaled, x))
+        if flight.broken != ALTITUDE:
+            return flight
+    if time is None and find_ground_contact(problem) is None:
+        x = new_extremal()
+        if solve_touching(scaled, x):
+            return PrimerFlight(x, scaled.mass_flow, _broken_limit(problem, scaled, x))
+    return flight
 
 
-def _keeps_limits(problem: LandingProblem, path: PrimerPath, unit: float) -> bool:
-    """Whether a flown path, in units of the acceleration `unit` and seconds, keeps every limit."""
-    limits = problem.limits
-    if broken_limit(path, path_limits(problem.lander.pointing_limit, limits.speed, limits.glide_slope), unit):
-        return False
+def _broken_limit(problem: LandingProblem, scaled: PrimerProblem, x: Extremal) -> int:
+    """The first limit that an extremal breaks, as of `path_limits`; KEPT, which is zero, if it keeps all."""
+    if PrimerFlight(x, scaled.mass_flow).log_mass_ratio > problem.log_mass_ratio:
+        return PROPELLANT
+    limits, unit = problem.limits, problem.lander.max_thrust / problem.state.mass
+    path = fly_extremal(x, scaled)
+    asked = path_limits(problem.lander.pointing_limit, limits.speed, limits.glide_slope)
+    broken = broken_limit(path, asked, unit)
+    if broken:
+        return broken
     final, sight = limits.final_thrust_direction, limits.line_of_sight
     if final is not None and final.excess(path.direction[-1]) > 0.0:
-        return False
-    return sight is None or not sight.outside(unit * path.position[:-1]).max() > 0.0
+        return FINAL_DIRECTION
+    outside = sight is not None and sight.outside(unit * path.position[:-1]).max() > 0.0
+    return LINE_OF_SIGHT if outside else KEPT

@@ -32,6 +32,8 @@ from guidance.lower_bound.dual_function import (
 STEPS = 48
 """Of the grid on which D is maximised: the primer needs no finer one."""
 _MOST_ITERATIONS = 60
+_OVERSHOOT = 1.5  # times what is enough
+_MOST_HALVINGS = 50
 _DIFFERENCE = 1e-6  # of the primer, for the second derivative
 _LEAST_DAMPING = 1e-9  # of the curvature that full thrust over the whole flight has
 _TRUSTED_DAMPING = 1e-3  # below it a step's promise is the distance to the maximum
@@ -192,6 +194,32 @@ def affine_basis(time: float) -> Array:
 
 
 @compile_kernel
+def _shorten(
+    primer: Array,
+    step: Array,
+    basis: Array,
+    time: float,
+    case: DualCase,
+    span: tuple[float, float],
+    out: Array,
+) -> float:
+    """Write the primer part of the way up a step, where D [m/s] lies in a span above that of the start; D."""
+    gradient, low, high = np.empty(basis.shape[0]), 0.0, 1.0
+    value = np.inf
+    for _ in range(_MOST_HALVINGS):
+        share = 0.5 * (low + high)
+        _numbers_to_primer(share * step, basis, primer, out)
+        value = dual_value(out, time, case, gradient)
+        if span[0] < value < span[1]:
+            break
+        if value > span[0]:
+            high = share
+        else:
+            low = share
+    return value
+
+
+@compile_kernel
 def ascend(
     start: Array, basis: Array, time: float, case: DualCase, tolerance: float, enough: float
 ) -> Ascent:
@@ -234,6 +262,10 @@ def ascend(
             damping *= 10.0
         if not better:
             stalled = True
+            break
+        if reached > _OVERSHOOT * enough:  # no maximum: a longer primer would be good at this time alone
+            reached = _shorten(primer, step, basis, time, case, (enough, _OVERSHOOT * enough), trial)
+            primer[:], value = trial, reached
             break
         numbers += step
         primer[:], gradient[:], value = trial, there, reached

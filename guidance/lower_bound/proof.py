@@ -11,9 +11,10 @@ from guidance.arrays import Array
 from guidance.descent.certificate import Certificate
 from guidance.descent.dual_bound import DualBound, DualPiece
 from guidance.descent.problem import LandingProblem
+from guidance.flight_time.extremal import set_primer, touches
 from guidance.flight_time.primer_vector import PrimerFlight
 from guidance.lower_bound.dual_ascent import two_impulse_primer
-from guidance.lower_bound.dual_case import dual_case
+from guidance.lower_bound.dual_case import DualCase, dual_case
 from guidance.lower_bound.dual_function import AFFINE, THETA
 from guidance.lower_bound.neighbour_cover import primer_of
 from guidance.lower_bound.time_cover import (
@@ -64,14 +65,17 @@ def prove_least_propellant(
     return Certificate(_SCOPE, (), (bound,), bound.propellant)
 
 
-def prove_no_flight(problem: LandingProblem, time: float) -> Certificate | None:
+def prove_no_flight(
+    problem: LandingProblem, time: float, flight: PrimerFlight | None = None
+) -> Certificate | None:
     """Proof that the tank does not pay for any flight of a landing; None where this bound does not show it.
 
     Args:
         problem: the landing problem.
         time: [s] a likely time of flight, to begin with.
+        flight: an extremal of that time, to begin with.
     """
-    bound = _bound_above_tank(problem, time)
+    bound = _bound_above_tank(problem, time, flight)
     if bound is None:
         return None
     causes = [name for name, without in _relaxed(problem) if _bound_above_tank(without, time) is None]
@@ -98,12 +102,14 @@ def certify_cover(
     return Certificate(_SCOPE, (), (bound,), bound.propellant)
 
 
-def _bound_above_tank(problem: LandingProblem, time: float) -> DualBound | None:
+def _bound_above_tank(
+    problem: LandingProblem, time: float, flight: PrimerFlight | None = None
+) -> DualBound | None:
     """A bound that no tank pays for; None where there is none."""
     exhaust = problem.lander.exhaust_velocity
     most = exhaust * problem.log_mass_ratio
     target = most + 2.0 * GRANTED * exhaust
-    times, cover = _cover(problem, most, time, None, CoverAim(target, GAP_TOLERANCE * exhaust, target))
+    times, cover = _cover(problem, most, time, flight, CoverAim(target, GAP_TOLERANCE * exhaust, target))
     return _bound_by_cover(problem, most, times, cover) if cover.level >= target else None
 
 
@@ -122,8 +128,19 @@ def _cover(
 ) -> tuple[Array, TimeCover]:
     case = dual_case(problem, most)
     times = time_grid(case, aim.target * (1.0 + 1e-12), time, _CELLS)
-    start = two_impulse_primer(time, case) if flight is None else primer_of(flight.extremal, case)
+    start = two_impulse_primer(time, case) if flight is None else _primer_along(flight, case)
     return times, cover_times(times, case, start, time, aim)
+
+
+def _primer_along(flight: PrimerFlight, case: DualCase) -> Array:
+    """The primer of a flight, shape (6,); or (10,) where it touches the ground."""
+    x = flight.extremal
+    primer, last = primer_of(x, case), np.empty(3)
+    if not touches(x):
+        return primer
+    set_primer(x, flight.time, last)
+    scale = float(np.linalg.norm(primer[:3]) / np.linalg.norm(last))
+    return np.concatenate([primer, [0.0, 0.0, scale * x.touch[1], flight.time - x.touch[0]]])
 
 
 def _bound_at(problem: LandingProblem, most: float, time: float) -> DualBound:

@@ -23,7 +23,7 @@ from guidance.descent.certificate import Certificate
 from guidance.descent.plan import Plan, PlanStatus
 from guidance.descent.problem import LandingProblem
 from guidance.descent.trajectory import Trajectory
-from guidance.flight_time.primer_vector import PrimerFlight, find_primer_flight
+from guidance.flight_time.primer_vector import PrimerFlight, find_extremal_flight, find_primer_flight
 from guidance.pdg.unrelaxed import plan_unrelaxed
 from guidance.state import State
 
@@ -61,11 +61,16 @@ class Request:
     landing_error_weight: float | None = None
 
     @cached_property
-    def flight(self) -> PrimerFlight | None:
-        """What the indirect method finds."""
+    def extremal(self) -> PrimerFlight | None:
+        """What the indirect method finds, whether or not it breaks a limit."""
         if self.landing_error_weight is not None:
             return None
-        return find_primer_flight(self.problem, self.time_of_flight)
+        return find_extremal_flight(self.problem, self.time_of_flight)
+
+    @property
+    def flight(self) -> PrimerFlight | None:
+        """The same, where it keeps every limit."""
+        return None if self.extremal is None or self.extremal.broken else self.extremal
 
     @property
     def bounds_first(self) -> bool:
@@ -148,7 +153,7 @@ def plan_by_method(request: Request) -> Plan:
     if request.bounds_first and request.flight is None:
         from guidance.planning.infeasibility import prove_by_dual_bound
 
-        proof = prove_by_dual_bound(request.problem)
+        proof = prove_by_dual_bound(request.problem, request.extremal)
         if proof is not None:
             none = Plan(PlanStatus.INFEASIBLE, request.problem, "dual bound", message=_OUT_OF_REACH)
             return replace(none, proof=proof)
@@ -269,7 +274,7 @@ def _prove_infeasible(request: Request, anywhere: bool) -> Certificate | ConvexS
 
     bounded = request.bounds_first or request.problem.rotates
     if request.time_of_flight is None and not bounded and not anywhere:
-        proof = prove_by_dual_bound(request.problem)
+        proof = prove_by_dual_bound(request.problem, request.extremal)
         if proof is not None:
             return proof
     return prove_infeasible(request.problem, request.nodes, request.time_of_flight, anywhere)

@@ -16,6 +16,7 @@ from guidance.planning.convex_task import ConvexTask, relaxation_tight
 from guidance.planning.infeasibility import prove_fixed_time, prove_free_time
 from guidance.planning.minimum_propellant import (
     LOG_MASS_TOLERANCE,
+    TimeOutcome,
     minimise_over_time,
     minimise_with_true_bounds,
     promised_gain,
@@ -74,15 +75,14 @@ def plan_convex(
         cause = forbidden_by(problem, time_of_flight)
         if cause:
             return ConvexAnswer(Plan(PlanStatus.INFEASIBLE, problem, METHOD, message=cause))
-        solution, solves = task.solve(time_of_flight), 1
+        outcome = TimeOutcome(task.solve(time_of_flight), 1)
     else:
         tolerance = LOG_MASS_TOLERANCE if guess_time is None else _REPLAN_TOLERANCE
         outcome = minimise_over_time(task, tolerance, guess_time, guess_time is None, flight)
-        solution, solves = outcome.solution, outcome.solves
-        if solution is None and outcome.cause:
+        if outcome.solution is None and outcome.cause:
             return ConvexAnswer(Plan(PlanStatus.INFEASIBLE, problem, METHOD, message=outcome.cause))
     worth = _worth_a_search(time_of_flight, provisional)
-    return _finish(task, solution, solves, PlanStatus.OPTIMAL, worth)
+    return _finish(task, outcome, PlanStatus.OPTIMAL, worth)
 
 
 def _worth_a_search(time_of_flight: float | None, provisional: bool) -> float | None:
@@ -93,18 +93,14 @@ def _worth_a_search(time_of_flight: float | None, provisional: bool) -> float | 
 
 
 def _finish(
-    task: ConvexTask,
-    found: ConvexSolution | None,
-    solves: int,
-    status: PlanStatus,
-    worth_a_search: float | None,
+    task: ConvexTask, outcome: TimeOutcome, status: PlanStatus, worth_a_search: float | None
 ) -> ConvexAnswer:
     """Refine a solution until the true thrust bounds hold, check the tank, and make it a Plan.
 
     Where the time of flight is free it is searched anew if the true bounds refuse it, or promise a gain in
     ln(mass) above `worth_a_search` at another; None keeps it.
     """
-    problem = task.problem
+    problem, found, solves = task.problem, outcome.solution, outcome.solves
     message = "no feasible time of flight found"
     none = Plan(PlanStatus.INFEASIBLE, problem, METHOD, message=message, solves=solves)
     if found is None:
@@ -117,10 +113,9 @@ def _finish(
     solves += more
     affordable = _affordable(problem, solution)
     if worth_a_search is not None and (not affordable or promised_gain(task, solution) > worth_a_search):
-        outcome = minimise_with_true_bounds(
-            task, LOG_MASS_TOLERANCE, found.time, solution if affordable else None
-        )
-        solution, solves = outcome.solution or solution, solves + outcome.solves
+        known = solution if affordable else None
+        again = minimise_with_true_bounds(task, LOG_MASS_TOLERANCE, found.time, known, outcome.window)
+        solution, solves = again.solution or solution, solves + again.solves
     none = replace(none, solves=solves)
     if not _affordable(problem, solution):
         words = "feasible only with thrust bounds relaxed outward: on the edge of what the lander can do"
@@ -215,7 +210,7 @@ def plan_weighed(
         best, solves = found, solves + more
         if not best.solved or abs(best.log_mass_ratio - before) < _SETTLED_MASS:
             break
-    return _finish(task, best, solves, PlanStatus.WEIGHED, worth)
+    return _finish(task, TimeOutcome(best, solves), PlanStatus.WEIGHED, worth)
 
 
 def plan_nearest(
@@ -253,11 +248,11 @@ def plan_nearest(
     error = (refined if refined.solved else least).landing_error
     economical = replace(anywhere, error_limit=1.001 * error + _ERROR_SLACK)
     if time_of_flight is not None:
-        last, more = economical.solve(time_of_flight), 1
+        outcome = TimeOutcome(economical.solve(time_of_flight), 1)
     else:
         outcome = minimise_over_time(economical, LOG_MASS_TOLERANCE, least.time, coarse_first=False)
-        last, more = outcome.solution, outcome.solves
-        if last is not None and not _affordable(problem, last):
-            last, more = economical.solve(least.time), more + 1
+        if outcome.solution is not None and not _affordable(problem, outcome.solution):
+            outcome = TimeOutcome(economical.solve(least.time), outcome.solves + 1)
+    outcome = replace(outcome, solves=solves + outcome.solves)
     worth = _worth_a_search(time_of_flight, provisional)
-    return _finish(economical, last, solves + more, PlanStatus.NEAREST, worth).plan
+    return _finish(economical, outcome, PlanStatus.NEAREST, worth).plan

@@ -12,6 +12,7 @@ from guidance.convex.programme import ConvexSolution, convex_template
 from guidance.convex.scaling import scale_problem
 from guidance.descent.certificate import Certificate
 from guidance.descent.problem import LandingProblem
+from guidance.flight_time.primer_vector import PrimerFlight
 from guidance.flight_time.time_window import TimeWindow, forbidden_by, guess_time, time_window
 from guidance.lower_bound.proof import prove_no_flight
 from guidance.planning.convex_task import ConvexTask
@@ -66,12 +67,17 @@ def prove_fixed_time(task: ConvexTask, time: float) -> Certificate | None:
     return Certificate(scope, proof.causes, (proof,))
 
 
-def prove_by_dual_bound(problem: LandingProblem) -> Certificate | None:
-    """Proof that the tank does not pay for any flight to the target; None where the bound shows none."""
+def prove_by_dual_bound(problem: LandingProblem, flight: PrimerFlight | None = None) -> Certificate | None:
+    """Proof that the tank does not pay for any flight to the target; None where the bound shows none.
+
+    Args:
+        problem: the landing problem.
+        flight: an extremal that breaks a limit, to begin with; None if none is known.
+    """
     window = time_window(problem)
     if window.empty:
         return None
-    return prove_no_flight(problem, guess_time(problem, window))
+    return prove_no_flight(problem, guess_time(problem, window) if flight is None else flight.time, flight)
 
 
 def prove_free_time(task: ConvexTask) -> Certificate | ConvexSolution | None:

@@ -42,7 +42,7 @@ class _Search:
         There it has kinks too where burns meet the nodes of a coarse mesh. In a frame that turns, or with a
         price on the landing error, it is not known either.
         """
-        unknown = task.problem.target_velocity.any() or task.problem.rotates or task.error_price > 0.0
+        unknown = not task.problem.ends_at_rest or task.problem.rotates or task.error_price > 0.0
         return cls(BracketSearch, 20.0) if unknown else cls(TimeSearch, 2.0)
 
 
@@ -54,11 +54,13 @@ class TimeOutcome:
         solution: the cheapest flight; None if no time tried was feasible.
         solves: conic solves that it took, coarse ones included.
         cause: the limit that leaves no time of flight, by closed-form bounds; empty if they leave one.
+        window: the times about the solution that no solve with relaxed bounds refused; None if none is known.
     """
 
     solution: ConvexSolution | None
     solves: int
     cause: str = ""
+    window: TimeWindow | None = None
 
 
 def _asymptote(task: ConvexTask) -> float:
@@ -114,11 +116,27 @@ def minimise_over_time(
                 solves += more
                 reference = refined.log_mass if refined.solved else None
     search = chosen.kind(_evaluation(task, reference), window, tolerance, model)
-    return TimeOutcome(search.run(start), solves + len(search.samples))
+    best = search.run(start)
+    return TimeOutcome(best, solves + len(search.samples), window=_not_refused(search.samples, best, window))
+
+
+def _not_refused(
+    samples: list[ConvexSolution], best: ConvexSolution | None, window: TimeWindow
+) -> TimeWindow | None:
+    """The window up to the nearest times on either side of the best that were proved infeasible."""
+    if best is None:
+        return None
+    refused = [s.time for s in samples if s.answer.status is SolveStatus.INFEASIBLE]
+    low = max((time for time in refused if time < best.time), default=window.low)
+    return TimeWindow(low, min((time for time in refused if time > best.time), default=window.high))
 
 
 def minimise_with_true_bounds(
-    task: ConvexTask, tolerance: float, near: float, known: ConvexSolution | None = None
+    task: ConvexTask,
+    tolerance: float,
+    near: float,
+    known: ConvexSolution | None = None,
+    window: TimeWindow | None = None,
 ) -> TimeOutcome:
     """Search the time of least cost with every time judged by the true thrust bounds.
 
@@ -131,6 +149,7 @@ def minimise_with_true_bounds(
         tolerance: gain below which the search stops, in units of the task's cost.
         near: [s] where the relaxed search ended.
         known: a solution at that time that keeps the true bounds; None if they refuse it.
+        window: where to look, as the relaxed search left it; None for all that closed-form bounds admit.
     """
     solves, reference = 0, None if known is None else known.log_mass
 
@@ -142,8 +161,8 @@ def minimise_with_true_bounds(
             reference = solution.log_mass
         return solution
 
-    window, search = time_window(task.problem, task.free_landing_point), _Search.of(task).kind
-    model = TimeModel(_asymptote(task))
+    window = window or time_window(task.problem, task.free_landing_point)
+    search, model = _Search.of(task).kind, TimeModel(_asymptote(task))
     if known is not None:
         return TimeOutcome(search(evaluate, window, tolerance, model).run(near, known), solves)
     for step in _STEPS_FROM_EDGE:
