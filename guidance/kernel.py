@@ -45,11 +45,6 @@ def kernel_folder() -> Path:
     return cache_folder() / "kernels" / source_hash()
 
 
-def holds_compiled_code() -> bool:
-    """Whether code of these sources was compiled before on this machine: what is left is to load it."""
-    return any(kernel_folder().rglob("*.nbc"))
-
-
 def compile_kernel(function: Function, *, parallel: bool = False) -> Function:
     """Compile a function on first call, without the GIL; cached on disk where that is possible.
 

@@ -6,13 +6,15 @@ Nothing that is shown here is written anywhere: the products are made from the f
 from __future__ import annotations
 
 import os
+from contextlib import suppress
 from dataclasses import replace
+from pathlib import Path
 from time import perf_counter
 
 from rich.console import Console
 from rich.table import Table
 
-from guidance.kernel import holds_compiled_code
+from guidance.kernel import kernel_folder
 from hda.registry import policy_entry
 from studies.campaign.executor import OpenExecutor
 from studies.campaign.monte_carlo import Chunk, Study, fly_chunk, prepare_study
@@ -53,7 +55,7 @@ def fly_comparison(folder: StudyFolder, open_executor: OpenExecutor, here: bool,
     seconds = None
     if here:
         prepare_study(study, workers)
-        if len(missing) > _FEW_CHUNKS or not holds_compiled_code():
+        if len(missing) > _FEW_CHUNKS or not is_compiled(study):
             seconds = rehearse(study, console)
     lacking = sum(last - first for first, last in missing)
     kept = study.episodes - lacking
@@ -87,7 +89,7 @@ def rehearse(study: Study, console: Console) -> float:
     Raises:
         PolicyError: a policy raised something.
     """
-    ready = holds_compiled_code()
+    ready = is_compiled(study)
     title = "loading compiled code" if ready else "compiling, once for this version of the code"
     expected = LOADING_SECONDS if ready else COMPILING_SECONDS
     seconds = 0.0
@@ -100,7 +102,27 @@ def rehearse(study: Study, console: Console) -> float:
             fly_chunk(alone, 0, 1)
             seconds += perf_counter() - began
             display.advance(1)
+    with suppress(OSError):  # nowhere to write: nothing is kept there either
+        kernel_folder().mkdir(parents=True, exist_ok=True)
+        _flown_before().write_text("".join(f"{name}\n" for name in sorted({*_read_flown(), *names})))
     return seconds
+
+
+def is_compiled(study: Study) -> bool:
+    """Whether each policy has flown at these sources on this machine: what is left is to load its code."""
+    return {name for name in study.policies if not policy_entry(name).slow} <= _read_flown()
+
+
+def _flown_before() -> Path:
+    """Names of the policies that a rehearsal flew, beside the code that it compiled."""
+    return kernel_folder() / "rehearsed.txt"
+
+
+def _read_flown() -> set[str]:
+    try:
+        return set(_flown_before().read_text().split())
+    except (OSError, UnicodeError):
+        return set()
 
 
 def _table_so_far(scores: dict[str, Score]) -> Table:

@@ -24,7 +24,10 @@ const Report = (function () {
     if (node.dataset.chart !== "headline" || node.clientWidth >= narrow) return layout;
     const entries = charts.headline.data.length;
     return Object.assign({}, layout, {
-      height: 460 + 13 * entries, margin: Object.assign({}, layout.margin, { l: 44, r: 8 }), legend: { orientation: "h", y: -0.16, yanchor: "top", font: { size: 12 } },
+      height: 400 + 10 * entries, margin: Object.assign({}, layout.margin, { l: 44, r: 8 }),
+      legend: {
+        orientation: "h", x: -0.12, y: -0.2, yanchor: "top", font: { size: 11 }, entrywidth: 0.5, entrywidthmode: "fraction", maxheight: 600,
+      },
     });
   }
   for (const node of document.querySelectorAll("[data-chart]")) {

@@ -3,18 +3,19 @@
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from rich.console import Console
 
-from guidance.kernel import cache_folder, holds_compiled_code
+from guidance.kernel import cache_folder
 from hda import registry
 from hda.registry import policy_entry
 from hda.task.presets import PRESETS
 from studies.campaign.monte_carlo import PolicyError, Study
 from studies.compare.command import Comparison, compare
-from studies.compare.flying import rehearse
+from studies.compare.flying import is_compiled, rehearse
 
 RAISES = "tests.studies.compare.test_flying:Raising"
 
@@ -34,8 +35,21 @@ class Raising:
 def test_a_rehearsal_says_what_an_episode_takes(capsys: pytest.CaptureFixture[str]) -> None:
     study = Study(PRESETS["paper"], ("no-divert", "single-divert"), 50)
     assert 0.0 < rehearse(study, Console()) < 5.0
-    assert holds_compiled_code()
+    assert is_compiled(study)
+    capsys.readouterr()
+    rehearse(study, Console())
     assert capsys.readouterr().out.startswith("loading compiled code (about 5 s)\n")
+
+
+def test_code_of_a_policy_counts_once_it_has_flown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("studies.compare.flying.kernel_folder", lambda: tmp_path / "kernels")
+    both = Study(PRESETS["paper"], ("no-divert", "single-divert", "nearest-safe+casadi"), 50)
+    assert not is_compiled(both)
+    rehearse(replace(both, policies=("no-divert",)), Console())
+    assert is_compiled(replace(both, policies=("no-divert",)))
+    assert not is_compiled(both)
+    rehearse(both, Console())
+    assert is_compiled(both)  # slow policies are not rehearsed
 
 
 def test_a_policy_that_fails_there_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -52,11 +66,11 @@ def test_the_products_do_not_depend_on_a_rehearsal(
     plain = {"policies": ("no-divert", "td3"), "episodes": 40, "figures": False, "report": False}
     compare(Comparison(**plain, workers=1, out=tmp_path / "rehearsed"))
     shown = capsys.readouterr().out
-    assert "loading compiled code" in shown
+    assert "compil" in shown
     assert "safe site %: no-divert " in shown
     monkeypatch.setattr("studies.compare.flying._FEW_CHUNKS", 100)
     compare(Comparison(**plain, workers=1, out=tmp_path / "not"))
-    assert "loading compiled code" not in capsys.readouterr().out
+    assert "compil" not in capsys.readouterr().out
     for name in ("episodes.csv", "table.csv"):
         assert (tmp_path / "rehearsed" / name).read_bytes() == (tmp_path / "not" / name).read_bytes()
 
