@@ -10,6 +10,8 @@ from typing import Any
 
 import pytest
 
+from studies.launcher import COMMANDS
+
 ROOT = Path(__file__).resolve().parents[2]
 WRITTEN = sorted(path.relative_to(ROOT).as_posix() for path in (ROOT / "docs").rglob("*.md"))
 PAGES = ("README.md", "CONTRIBUTING.md", "SECURITY.md", *WRITTEN)
@@ -108,6 +110,12 @@ def test_every_module_of_a_command_exists(page: str) -> None:
 def test_every_target_of_make_exists(page: str) -> None:
     targets = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
     assert set(re.findall(r"`make ([a-z-]+)", read_page(page))) <= targets
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if "lunar-hda " in read_page(page)])
+def test_every_command_of_the_launcher_exists(page: str) -> None:
+    named = re.findall(r"(?:`|^    )lunar-hda ([a-z][a-z-]*)", read_page(page), re.MULTILINE)
+    assert set(named) <= set(COMMANDS)
 
 
 def commands() -> dict[str, set[str]]:
