@@ -74,11 +74,12 @@ def draw_headline(summaries: Sequence[PolicySummary]) -> Figure:
             hovertemplate="the paper, %{text}<br>%{y:.1f} % unsafe, %{x} % propellant<extra></extra>",
         )
     )
-    figure.update_layout(showlegend=True, height=max(460, 120 + 20 * len(figure.data)))
+    figure.update_layout(showlegend=True, height=max(460, 140 + 20 * len(summaries)))
     _finish(figure, "propellant burnt [%]", "unsafe sites [%]")
     lowest = [unsafe_percent(summary).low or 50.0 / summary.episodes for summary in summaries]
     shares = [*lowest, *(100.0 - row["safe_site_percent"] for row in PAPER_ROWS.values())]
-    burnt = [value for trace in figure.data for value in trace.x]
+    burnt = [summary.propellant.estimate for summary in summaries]
+    burnt += [row["propellant_percent"] for row in PAPER_ROWS.values()]
     figure.update_xaxes(range=[min(burnt) - 1.5, max(burnt) + 2.5])
     ticks = [value for power in range(-5, 3) for value in (10.0**power, 3.0 * 10.0**power) if value <= 100.0]
     figure.update_yaxes(

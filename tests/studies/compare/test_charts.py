@@ -1,6 +1,7 @@
 """The charts of a report hold the numbers of its tables."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,12 +9,14 @@ import pytest
 from hda.flight.episode_row import MEASURES, EpisodeRow
 from hda.flight.palette import COLORS
 from studies.campaign.monte_carlo import Chunk
-from studies.compare.charts import draw_distribution, draw_headline
+from studies.compare import charts
 from studies.compare.scores import StudyScores, score_study
 from studies.compare.table import PolicySummary, summarize_policy
 from studies.paper import PAPER_ROWS
 from studies.statistics.ratios import wilson_interval
 
+draw_distribution: Any = charts.draw_distribution
+draw_headline: Any = charts.draw_headline  # plotly's figures say nothing of their traces to a type checker
 EPISODES = 50
 UNSAFE = {"single-divert": 10, "other": 1, "never": 0}
 
