@@ -1,6 +1,7 @@
 """The charts of a report hold the numbers of its tables."""
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -67,6 +68,16 @@ def test_a_policy_that_never_fails_stands_hollow_at_half_an_episode(summaries: l
     upper = 100.0 * (1.0 - wilson_interval(EPISODES, EPISODES).low)
     assert trace.y[0] + trace.error_y.array[0] == pytest.approx(upper)
     assert trace.text[0].startswith("never: 0.00 % unsafe (0.00 to")
+
+
+@pytest.mark.parametrize("episodes", range(1, 400, 7))
+def test_no_number_of_episodes_draws_the_axis_down(summaries: list[PolicySummary], episodes: int) -> None:
+    """Wilson's upper end of a perfect ratio is 1 only to rounding."""
+    never = next(summary for summary in summaries if summary.policy == "never")
+    perfect = replace(never, episodes=episodes, safe_site=wilson_interval(episodes, episodes))
+    figure = draw_headline([perfect])
+    assert figure.data[0].error_y.arrayminus[0] == 0.0
+    assert figure.layout.yaxis.range[0] > math.log10(min(25.0 / episodes, 3.0))  # the paper stands at 5.2
 
 
 def test_everything_of_the_headline_lies_inside_its_axes(summaries: list[PolicySummary]) -> None:
