@@ -49,7 +49,7 @@ def draw_headline(summaries: Sequence[PolicySummary]) -> Figure:
                 x=[propellant.estimate],
                 y=[shown],
                 error_x=_bars([(propellant.estimate, propellant.low, propellant.high)]),
-                error_y=_bars([(shown, min(unsafe.low, shown) or shown, max(unsafe.high, shown))]),
+                error_y=_bars([(shown, _lower_end(unsafe, shown), max(unsafe.high, shown))]),
                 mode="markers",
                 marker=marker,
                 name=summary.policy,
@@ -74,11 +74,12 @@ def draw_headline(summaries: Sequence[PolicySummary]) -> Figure:
             hovertemplate="the paper, %{text}<br>%{y:.1f} % unsafe, %{x} % propellant<extra></extra>",
         )
     )
-    figure.update_layout(showlegend=True, height=max(460, 120 + 20 * len(figure.data)))
+    figure.update_layout(showlegend=True, height=max(460, 140 + 20 * len(summaries)))
     _finish(figure, "propellant burnt [%]", "unsafe sites [%]")
-    lowest = [unsafe_percent(summary).low or 50.0 / summary.episodes for summary in summaries]
+    lowest = [_lower_end(unsafe_percent(summary), 50.0 / summary.episodes) for summary in summaries]
     shares = [*lowest, *(100.0 - row["safe_site_percent"] for row in PAPER_ROWS.values())]
-    burnt = [value for trace in figure.data for value in trace.x]
+    burnt = [summary.propellant.estimate for summary in summaries]
+    burnt += [row["propellant_percent"] for row in PAPER_ROWS.values()]
     figure.update_xaxes(range=[min(burnt) - 1.5, max(burnt) + 2.5])
     ticks = [value for power in range(-5, 3) for value in (10.0**power, 3.0 * 10.0**power) if value <= 100.0]
     figure.update_yaxes(
@@ -94,6 +95,11 @@ def unsafe_percent(summary: PolicySummary) -> Interval:
     """[%] share of unsafe sites with Wilson's interval."""
     safe = summary.safe_site
     return Interval(*(100.0 * (1.0 - end) for end in (safe.estimate, safe.high, safe.low)))
+
+
+def _lower_end(unsafe: Interval, shown: float) -> float:
+    """Where an interval ends on a logarithmic axis: without an unsafe site, at the mark itself."""
+    return unsafe.low if unsafe.estimate else shown
 
 
 def draw_differences(differences: Sequence[PairedDifference]) -> Figure:

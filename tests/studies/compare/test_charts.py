@@ -1,6 +1,8 @@
 """The charts of a report hold the numbers of its tables."""
 
 import math
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,12 +10,14 @@ import pytest
 from hda.flight.episode_row import MEASURES, EpisodeRow
 from hda.flight.palette import COLORS
 from studies.campaign.monte_carlo import Chunk
-from studies.compare.charts import draw_distribution, draw_headline
+from studies.compare import charts
 from studies.compare.scores import StudyScores, score_study
 from studies.compare.table import PolicySummary, summarize_policy
 from studies.paper import PAPER_ROWS
 from studies.statistics.ratios import wilson_interval
 
+draw_distribution: Any = charts.draw_distribution
+draw_headline: Any = charts.draw_headline  # plotly's figures say nothing of their traces to a type checker
 EPISODES = 50
 UNSAFE = {"single-divert": 10, "other": 1, "never": 0}
 
@@ -64,6 +68,16 @@ def test_a_policy_that_never_fails_stands_hollow_at_half_an_episode(summaries: l
     upper = 100.0 * (1.0 - wilson_interval(EPISODES, EPISODES).low)
     assert trace.y[0] + trace.error_y.array[0] == pytest.approx(upper)
     assert trace.text[0].startswith("never: 0.00 % unsafe (0.00 to")
+
+
+@pytest.mark.parametrize("episodes", range(1, 400, 7))
+def test_no_number_of_episodes_draws_the_axis_down(summaries: list[PolicySummary], episodes: int) -> None:
+    """Wilson's upper end of a perfect ratio is 1 only to rounding."""
+    never = next(summary for summary in summaries if summary.policy == "never")
+    perfect = replace(never, episodes=episodes, safe_site=wilson_interval(episodes, episodes))
+    figure = draw_headline([perfect])
+    assert figure.data[0].error_y.arrayminus[0] == 0.0
+    assert figure.layout.yaxis.range[0] > math.log10(min(25.0 / episodes, 3.0))  # the paper stands at 5.2
 
 
 def test_everything_of_the_headline_lies_inside_its_axes(summaries: list[PolicySummary]) -> None:
