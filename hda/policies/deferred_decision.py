@@ -154,7 +154,7 @@ class DeferredDecisionPolicy:
         present = belief.cell(observation.target)
         if memory.committed and present is not None and landing[present] >= self.options.keep_probability:
             return self._fly_to(observation.target, observation, memory)
-        price = self._ranking().price(observation, memory.view, belief)
+        price = self._ranking().price_by(safe, observation, memory.view, belief)
         candidates = self._choose(price, landing, observation, belief)
         trunk = None if memory.committed else self._defer(observation, candidates, memory)
         if trunk is None:

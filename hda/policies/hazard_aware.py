@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from guidance.arrays import Array
 from guidance.constants import MOON_GRAVITY
@@ -68,11 +69,25 @@ class HazardAwareSite:
         load_kernels()
         return HazardAwareMemory(view)
 
-    def price(self, observation: Observation, view: ScenarioView, belief: SafetyBelief) -> Array:
-        """[kg] J of every cell of the belief's square, shape (n, n)."""
+    def price(
+        self, observation: Observation, view: ScenarioView, belief: SafetyBelief, within: float = math.inf
+    ) -> Array:
+        """[kg] J of every cell of the belief's square, shape (n, n); `within` as in `price_sites`."""
         safe = infer_unseen(belief.probability(), belief.seen)
+        return self.price_by(safe, observation, view, belief, within)
+
+    def price_by(
+        self,
+        safe: NDArray[np.float32],
+        observation: Observation,
+        view: ScenarioView,
+        belief: SafetyBelief,
+        within: float = math.inf,
+    ) -> Array:
+        """The same where the probability that each cell is safe, shape (n, n), is known."""
         next_look = predict_next_look(observation, view, belief.corner, self.weights.commit_time)
-        return price_sites(safe, propellant_map(observation, view, belief), next_look, self.weights)
+        propellant = propellant_map(observation, view, belief)
+        return price_sites(safe, propellant, next_look, self.weights, within)
 
     def select(self, observation: Observation, memory: HazardAwareMemory) -> tuple[Array, HazardAwareMemory]:
         """Fuse the look, price every cell, and move if another gains enough."""
@@ -83,7 +98,7 @@ class HazardAwareSite:
         height = float(observation.state.position[2] - observation.target[2])
         if height <= 0.0 or (not first and observation.time_to_go <= self.weights.commit_time):
             return observation.target, memory
-        price = self.price(observation, view, belief)
+        price = self.price(observation, view, belief, self.weights.switch_gain)
         best = divmod(int(np.argmin(price)), price.shape[1])
         present = belief.cell(observation.target)
         if present is not None and price[present] <= price[best] + self.weights.switch_gain:
