@@ -40,6 +40,11 @@ def source_hash() -> str:
     return digest.hexdigest()[:16]
 
 
+def kernel_folder() -> Path:
+    """Where the compiled code of these sources is kept."""
+    return cache_folder() / "kernels" / source_hash()
+
+
 def compile_kernel(function: Function, *, parallel: bool = False) -> Function:
     """Compile a function on first call, without the GIL; cached on disk where that is possible.
 
@@ -50,7 +55,7 @@ def compile_kernel(function: Function, *, parallel: bool = False) -> Function:
     compiled = numba.njit(nogil=True, parallel=parallel)(function)
     before = _numba_config.CACHE_DIR
     try:
-        _numba_config.CACHE_DIR = str(cache_folder() / "kernels" / source_hash())
+        _numba_config.CACHE_DIR = str(kernel_folder())
         compiled.enable_caching()
     except (RuntimeError, OSError):
         pass  # nowhere to write: compile in memory

@@ -5,6 +5,8 @@ python -m rl.train td3 --seed 0 --out runs/td3-0      # an agent; also sac, ddpg
 python -m rl.train td3-lstm --seed 0 --out runs/m-0   # an agent with memory; also td3-lstm-plus
 python -m rl.train td3 --seed 0 --out runs/td3-0 --resume
 python -m rl.train export --name td3 --runs runs/td3-0 runs/td3-1 runs/td3-2
+
+Training needs the extra `train` (torch, Stable-Baselines3, tensorboard): pip install 'lunar-hda[train]'.
 """
 
 from __future__ import annotations
@@ -20,6 +22,7 @@ from guidance.console import tolerate_encoding
 from rl.settings import RECIPES, RECURRENT_RECIPES, AgentSettings, RecurrentSettings
 from rl.training.export import ExportWeights, run_export
 from rl.training.train_autoencoder import TrainAutoencoder, run_autoencoder_training
+from rl.training_libraries import require_training_libraries
 
 
 @dataclass(frozen=True)
@@ -119,10 +122,12 @@ def main() -> None:
     tolerate_encoding()
     command = tyro.cli(Command, description=__doc__)  # type: ignore[call-overload]
     try:
+        if isinstance(command, ExportWeights):
+            run_export(command)
+            return
+        require_training_libraries()
         if isinstance(command, TrainAutoencoder):
             run_autoencoder_training(command)
-        elif isinstance(command, ExportWeights):
-            run_export(command)
         else:
             run_agent_training(command, sys.argv[1])
     except ValueError as error:

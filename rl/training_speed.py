@@ -18,6 +18,7 @@ import numpy as np
 import tyro
 
 from guidance.console import tolerate_encoding
+from rl.training_libraries import TrainingLibrariesError, require_training_libraries
 
 
 @dataclass(frozen=True)
@@ -204,6 +205,10 @@ def main() -> None:
     """Command line."""
     tolerate_encoding()
     options = tyro.cli(TrainingSpeed, description=__doc__)
+    try:
+        require_training_libraries()
+    except TrainingLibrariesError as error:
+        sys.exit(f"error: {error}")
     speeds = measure_training_speed(options)
     reference = speeds["stable-baselines3"]
     for name, speed in speeds.items():

@@ -23,6 +23,7 @@ from hda.flight.episode import fly_legs
 from hda.policy import PrivilegedPolicy
 from hda.registry import make_policy
 from hda.task.scenario import sample_scenario
+from rl.training_libraries import TrainingLibrariesError, require_training_libraries
 from studies.campaign.command_line import one_line_errors, open_folder
 from studies.campaign.provenance import describe_run, write_provenance
 from studies.columns import Column, console_table, write_csv
@@ -153,6 +154,10 @@ def bench(options: Bench) -> tuple[list[Work], list[SpeedRatio]]:
     console.print(console_table(RATIO_COLUMNS, ratios, "processor times as ratios, and the limits they keep"))
     (bulk,) = (work for work in works if "solve_pdg_many" in work.name)
     console.print(f"{bulk.name}: {1.0 / bulk.median:.0f} starts a second")
+    try:
+        require_training_libraries()
+    except TrainingLibrariesError as error:
+        console.print(f"an update of training is not measured: {error}", markup=False)
     console.print(f"results in {out}")
     return works, ratios
 

@@ -21,6 +21,7 @@ from guidance.validation import finite_number
 from hda.flight.episode import begin_flight, observe
 from hda.task.scenario import sample_scenario
 from rl.inference.latent import load_encoder
+from rl.training_libraries import TrainingLibrariesError, require_training_libraries
 from studies.columns import Column
 
 Result = TypeVar("Result")
@@ -86,7 +87,7 @@ COLUMNS: tuple[Column[SpeedRatio], ...] = (
 
 
 def measure_ratios(preset: str = "paper", repeats: int = 15) -> list[SpeedRatio]:
-    """Measure every ratio.
+    """Measure every ratio; that of training where its libraries (the extra `train`) are installed.
 
     Args:
         preset: setting of the starts and looks, on the tuning tiles.
@@ -100,7 +101,7 @@ def measure_ratios(preset: str = "paper", repeats: int = 15) -> list[SpeedRatio]
         *_compare_solves(preset, repeats),
         _compare_bulk(preset, repeats),
         _compare_encoding(preset, repeats),
-        _compare_updates(min(repeats, _UPDATE_ROUNDS)),
+        *_compare_updates(min(repeats, _UPDATE_ROUNDS)),
         _compare_imports(repeats),
     ]
 
@@ -149,13 +150,18 @@ def _compare_encoding(preset: str, repeats: int) -> SpeedRatio:
     return SpeedRatio("encoding a look", "the look", _median(encodings), _median(looks), ENCODING_LIMIT)
 
 
-def _compare_updates(rounds: int) -> SpeedRatio:
+def _compare_updates(rounds: int) -> tuple[SpeedRatio, ...]:
+    """None where the libraries that training needs are not installed."""
     from rl.training_speed import TrainingSpeed, measure_training_speed
 
+    try:
+        require_training_libraries()
+    except TrainingLibrariesError:
+        return ()
     speeds = measure_training_speed(TrainingSpeed(rounds=rounds))
     ours = max(speeds["float32"], speeds["bfloat16 products"])  # the processor decides which is faster
     theirs = speeds["stable-baselines3"]
-    return SpeedRatio("an update", "plain Stable-Baselines3's", 1.0 / ours, 1.0 / theirs, UPDATE_LIMIT)
+    return (SpeedRatio("an update", "plain Stable-Baselines3's", 1.0 / ours, 1.0 / theirs, UPDATE_LIMIT),)
 
 
 def _compare_imports(repeats: int) -> SpeedRatio:

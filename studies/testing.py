@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import rl  # noqa: F401 - puts the learning agents into the registry
 from guidance.validation import finite_number
 from hda.flight.episode import fly
 from hda.ground.library import Ground, prepare_tiles

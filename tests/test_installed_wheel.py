@@ -30,8 +30,10 @@ RUNS: dict[str, tuple[list[str], list[str]]] = {
         ["plan.png"],
     ),
     "hda.belief_statistics": (["--tiles", "1"], []),
+    "hda.flight.film": (["--step", "5", "--width", "300", "--out", "flight.gif"], ["flight.gif"]),
     "hda.terrain": (["--size", "200", "--show", "tile.png"], ["tile.png"]),
     "rl.figures": (["gains", "--out", "gains.png"], ["gains.png"]),
+    "rl.model_cards": (["--out", "cards.md"], ["cards.md"]),
     "rl.train": (
         ["td3", "--steps", "40", "--validate-every", "20", "--validation-episodes", "2", "--out", "run"],
         ["run/run.json", "run/validation.csv"],
@@ -162,6 +164,19 @@ def test_the_wheel_holds_the_packages_and_their_data_and_nothing_else(installati
         ["git", "ls-files", *PACKAGES], capture_output=True, text=True, cwd=ROOT, check=True
     ).stdout.split()
     assert sorted(names) == sorted(tracked)
+
+
+def test_the_one_command_is_installed(installation: Installation) -> None:
+    """As a file beside the interpreter, which its spawned workers read too."""
+    launcher = str(installation.python.with_name("lunar-hda"))
+    call = "import subprocess, sys; sys.exit(subprocess.call(sys.argv[1:]))"
+    explained = installation.run("-c", call, launcher, "--help")
+    assert explained.returncode == 0, explained.stderr
+    assert "lunar-hda COMMAND" in explained.stdout
+    flown = ["compare", "--episodes", "20", "--workers", "2", "--policies", "no-divert", "--no-report"]
+    done = installation.run("-c", call, launcher, *flown, "--out", "launched")
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert (installation.place / "launched" / "table.csv").stat().st_size > 0
 
 
 @pytest.mark.parametrize("command", RUNS)

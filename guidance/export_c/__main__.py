@@ -28,7 +28,7 @@ def main(arguments: list[str] | None = None) -> None:
     import tyro
 
     tolerate_encoding()
-    command = tyro.cli(ExportCommand, args=arguments, prog="python -m guidance.export_c")
+    command = tyro.cli(ExportCommand, args=arguments)
     try:
         written = export_flight_code(command.out, command.overwrite)
     except OSError as error:
@@ -39,4 +39,5 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 if __name__ == "__main__":
+    sys.argv[0] = "python -m guidance.export_c"  # what --help says
     main()

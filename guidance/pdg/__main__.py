@@ -138,7 +138,7 @@ def main(arguments: list[str] | None = None) -> None:
     import tyro
 
     tolerate_encoding()
-    command = tyro.cli(PdgCommand, args=arguments, prog="python -m guidance.pdg")
+    command = tyro.cli(PdgCommand, args=arguments)
     try:
         plan = command.solve()
         if command.plot is not None:
@@ -158,4 +158,5 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 if __name__ == "__main__":
+    sys.argv[0] = "python -m guidance.pdg"  # what --help says
     main()

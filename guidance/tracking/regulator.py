@@ -49,11 +49,13 @@ def tracking_gains(control_period: float, weights: TrackingWeights) -> TrackingG
         control_period: [s] above zero.
         weights: the regulator's weights.
     """
-    import control
+    from scipy.linalg import solve, solve_discrete_are  # python-control's `dlqr` gives the same bits, in 2 s
 
     h = finite_number("control_period", control_period, above=0.0)
     motion = np.array([[1.0, h], [0.0, 1.0]])
     held_input = np.array([[0.5 * h * h], [h]])
-    cost = np.diag([weights.position**-2, weights.velocity**-2])
-    gain = np.asarray(control.dlqr(motion, held_input, cost, [[weights.acceleration**-2]])[0])
+    state_cost = np.diag([weights.position**-2, weights.velocity**-2])
+    input_cost = np.array([[weights.acceleration**-2]])
+    cost_to_go = solve_discrete_are(motion, held_input, state_cost, input_cost)
+    gain = solve(held_input.T @ cost_to_go @ held_input + input_cost, held_input.T @ cost_to_go @ motion)
     return TrackingGains(float(gain[0, 0]), float(gain[0, 1]))

@@ -1,8 +1,9 @@
 """What a preset is, and the named settings of the benchmark.
 
-The numbers of `paper` and `hard` come from `python -m studies.calibrate` on the tuning tiles; the README
-shows what they give beside the paper's row. `partial` is the ground of `paper` seen badly, so that one look
-is not enough: five times its map noise, two looks of five without a map, and errors of the estimated state.
+The numbers of `paper` and `hard` come from `python -m studies.calibrate` on the tuning tiles;
+docs/explanation/calibration.md shows what they give beside the paper's row. `partial` is the ground of
+`paper` seen badly, so that one look is not enough: five times its map noise, two looks of five without a map,
+and errors of the estimated state.
 """
 
 from __future__ import annotations

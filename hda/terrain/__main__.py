@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -68,8 +69,9 @@ def show_terrain(
 def main() -> None:
     """Run the command."""
     tolerate_encoding()
-    tyro.cli(show_terrain, prog="python -m hda.terrain")
+    tyro.cli(show_terrain)
 
 
 if __name__ == "__main__":
+    sys.argv[0] = "python -m hda.terrain"  # what --help says
     main()

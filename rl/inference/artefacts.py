@@ -11,6 +11,7 @@ import hashlib
 import json
 import platform
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -68,11 +69,14 @@ def card_digest(card: Mapping[str, Any]) -> str:
 
 
 def library_versions() -> dict[str, str]:
-    """Versions of what the numbers depend on."""
-    from importlib.metadata import version
+    """Versions of what the numbers depend on; a library for training that is not installed is left out."""
+    from importlib.metadata import PackageNotFoundError, version
 
-    names = ("numpy", "torch", "stable_baselines3", "gymnasium", "numba")
-    return {"python": platform.python_version(), **{name: version(name) for name in names}}
+    versions = {"python": platform.python_version()}
+    for name in ("numpy", "torch", "stable_baselines3", "gymnasium", "numba"):
+        with suppress(PackageNotFoundError):
+            versions[name] = version(name)
+    return versions
 
 
 def save_artefact(path: Path, kind: str, tensors: Tensors, card: Mapping[str, Any]) -> Artefact:

@@ -1,12 +1,15 @@
 """What learns: algorithms on top of Stable-Baselines3 and torch, the autoencoder, and TD3 with memory.
 
-torch lives here and in `rl.training`. It knows environments by their spaces; runs, files and scores belong
-to `rl.training`, which imports it.
+torch lives here and in `rl.training`; where the extra `train` is missing, importing this wing says so in one
+line. It knows environments by their spaces; runs, files and scores belong to `rl.training`, which imports it.
 """
 
 from typing import TYPE_CHECKING
 
 from guidance.exports import lazy_exports
+from rl.training_libraries import require_training_libraries
+
+require_training_libraries()
 
 if TYPE_CHECKING:
     from rl.learning.algorithms import make_algorithm

@@ -5,14 +5,11 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-from torch import nn
-
 from rl.environment.encoding import ENCODING_VERSION, LAYOUTS
 from rl.inference.artefacts import Tensors
 from rl.inference.latent import LATENT_SIZE, load_autoencoder, load_encoder
 from rl.inference.networks import Perceptron
 from rl.inference.recurrent_network import RecurrentNetwork
-from rl.learning.recurrent.networks import RecurrentActor
 from rl.policies.actor import Actor, ActorPolicy
 from rl.policies.recurrent_actor import MemoryActor, RecurrentActorPolicy
 from rl.settings import RecurrentSettings
@@ -20,12 +17,15 @@ from rl.settings import RecurrentSettings
 if TYPE_CHECKING:
     from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
 
+    from rl.learning.recurrent.networks import RecurrentActor
     from rl.learning.recurrent.td3_lstm import RecurrentTD3
     from rl.settings import AgentSettings
 
 
 def actor_tensors(algorithm: OffPolicyAlgorithm | RecurrentTD3) -> Tensors:
     """Dense layers of the actor, in order; for a stochastic actor those of its mean; and its LSTM."""
+    from torch import nn
+
     actor: Any = algorithm.actor  # type: ignore[attr-defined]
     if hasattr(actor, "history"):
         return _recurrent_tensors(actor)
@@ -39,6 +39,8 @@ def actor_tensors(algorithm: OffPolicyAlgorithm | RecurrentTD3) -> Tensors:
 
 
 def _recurrent_tensors(actor: RecurrentActor) -> Tensors:
+    from torch import nn
+
     history = dict(actor.history.named_parameters())
     parts = {"lstm.input": history["weight_ih_l0"].T, "lstm.recurrent": history["weight_hh_l0"].T}
     parts["lstm.bias"] = history["bias_ih_l0"] + history["bias_hh_l0"]

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from rl.settings import AgentSettings
     from rl.training.scoring import Score
 
+TUNING_SEED = 900_000
+"""Study seed of the periodic validation of a run, on the tuning tiles."""
 CHOICE_SEED = 900_001
 """Study seed of the choice, on the tuning tiles; not that of the periodic validation."""
 
@@ -116,7 +118,6 @@ def best_of_run(run: Path, choice: Choice, workers: int) -> Candidate:
     from hda.task.presets import find_preset
     from rl.inference.artefacts import load_artefact
     from rl.settings import settings_from_json
-    from rl.training.recorder import TUNING_SEED
     from rl.training.run_folder import read_rows, read_run
 
     card = read_run(run)

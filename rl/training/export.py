@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import tyro
 
 from rl.inference.artefacts import WEIGHTS_FOLDER
-from rl.training.candidates import CHOICE_SEED, Candidate, Choice, best_of_run
+from rl.training.candidates import CHOICE_SEED, TUNING_SEED, Candidate, Choice, best_of_run
 
 if TYPE_CHECKING:
     from hda.task.presets import Preset
@@ -83,7 +83,6 @@ def run_export(options: ExportWeights) -> None:
     from rl.inference.artefacts import library_versions, save_artefact
     from rl.settings import settings_from_json
     from rl.training.actor_export import actor_card
-    from rl.training.recorder import TUNING_SEED
     from rl.training.run_folder import read_rows, read_run
 
     finite_number("workers", options.workers, at_least=1)

@@ -17,12 +17,10 @@ from rl.environment.env import LunarHDAEnv
 from rl.inference.artefacts import save_artefact
 from rl.settings import AgentSettings
 from rl.training.actor_export import actor_card, actor_tensors, policy_of
+from rl.training.candidates import TUNING_SEED
 from rl.training.checkpoint import save_checkpoint
 from rl.training.run_folder import TrainingPlan, append_row, truncate_rows
 from rl.training.scoring import Score, score_policy
-
-TUNING_SEED = 900_000
-"""Study seed of the periodic validation on the tuning tiles."""
 
 
 class Recorder(BaseCallback):

@@ -6,9 +6,7 @@ import json
 from dataclasses import asdict
 from pathlib import Path
 
-import torch
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-from stable_baselines3.common.logger import Logger, TensorBoardOutputFormat
 
 from hda.task.presets import Preset
 from rl.environment.env import LunarHDAEnv
@@ -18,7 +16,6 @@ from rl.learning.precision import matmul_precision
 from rl.settings import AgentSettings
 from rl.training.actor_export import actor_card
 from rl.training.checkpoint import newest_checkpoint, restore_checkpoint
-from rl.training.recorder import Recorder
 from rl.training.run_folder import TrainingPlan, read_run
 
 
@@ -37,12 +34,18 @@ def run_training(
     Raises:
         ValueError: the folder holds a run and `resume` is not set, or holds a run with other settings.
     """
+    import torch
+
     torch.set_num_threads(1)
     with matmul_precision(settings.matmul_precision):
         _train(folder, preset, settings, plan, resume)
 
 
 def _train(folder: Path, preset: Preset, settings: AgentSettings, plan: TrainingPlan, resume: bool) -> None:
+    from stable_baselines3.common.logger import Logger, TensorBoardOutputFormat
+
+    from rl.training.recorder import Recorder
+
     checkpoint = _open_folder(folder, preset, settings, plan, resume)
     env = LunarHDAEnv(preset, layout=settings.layout, action_ranges=settings.action_ranges)
     algorithm = make_algorithm(settings, env, plan.seed)

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from hda.flight.episode_row import EpisodeRow
 from studies.campaign.claimed_folder import Existing
 from studies.campaign.episode_files import write_episodes
 from studies.campaign.executor import OpenExecutor, local_processes
-from studies.campaign.monte_carlo import Study, chunk_bounds, fly_chunks, join_chunks, prepare_study
+from studies.campaign.monte_carlo import Chunk, Study, chunk_bounds, fly_chunks, join_chunks, prepare_study
 from studies.campaign.provenance import describe_study, write_provenance
 from studies.campaign.study_folder import StudyFolder, open_study_folder
 
@@ -49,7 +49,7 @@ def fly_missing(
     missing: Sequence[tuple[int, int]],
     open_executor: OpenExecutor,
     workers: int,
-    bar: tuple[Progress, TaskID],
+    on_chunk: Callable[[Chunk], None],
 ) -> None:
     """Fly chunks; each goes to the folder at once, so that a stopped study goes on.
 
@@ -58,21 +58,21 @@ def fly_missing(
         missing: (first episode, one past the last) of each chunk.
         open_executor: makes what runs them.
         workers: processes, unless the executor counts them itself.
-        bar: counts flights; it is moved on by those that stand in the folder already.
+        on_chunk: called with each chunk once it is kept.
 
     Raises:
         ValueError: a policy or a worker failed.
     """
-    progress, task = bar
-    each = len(folder.study.policies)
-    lacking = sum(last - first for first, last in missing)
-    progress.advance(task, (folder.study.episodes - lacking) * each)
     for chunk in fly_chunks(folder.study, missing, open_executor, workers=workers):
         folder.store(chunk)
-        progress.advance(task, (chunk.last - chunk.first) * each)
-        if chunk.attempts > 1:
-            again = f"a worker died: episodes {chunk.first} to {chunk.last - 1} were flown again"
-            progress.console.print(again)
+        on_chunk(chunk)
+
+
+def describe_retry(chunk: Chunk) -> str:
+    """That a chunk was flown again, in words; empty where it was not."""
+    if chunk.attempts == 1:
+        return ""
+    return f"a worker died: episodes {chunk.first} to {chunk.last - 1} were flown again"
 
 
 def fly_points(out: Path, points: Sequence[Point], existing: Existing, workers: int) -> dict[str, Rows]:
@@ -110,7 +110,16 @@ def fly_points(out: Path, points: Sequence[Point], existing: Existing, workers: 
             processes = partial(local_processes, workers)
             for number, (point, folder) in enumerate(zip(points, folders, strict=True)):
                 progress.update(task, description=f"{point.label} ({number + 1}/{len(points)})")
-                fly_missing(folder, missing[number], processes, workers, (progress, task))
+                each = len(point.study.policies)
+                lacking = sum(last - first for first, last in missing[number])
+                progress.advance(task, (point.study.episodes - lacking) * each)
+
+                def count(chunk: Chunk, each: int = each) -> None:
+                    progress.advance(task, (chunk.last - chunk.first) * each)
+                    if words := describe_retry(chunk):
+                        progress.console.print(words)
+
+                fly_missing(folder, missing[number], processes, workers, count)
         return {point.label: _finish_point(folder) for point, folder in zip(points, folders, strict=True)}
 
 

@@ -26,8 +26,6 @@ _PACKAGES = (
     "numba",
     "numpy",
     "scipy",
-    "stable-baselines3",
-    "torch",
 )
 
 

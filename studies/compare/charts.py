@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -13,44 +14,92 @@ from studies.compare.differences import PairedDifference
 from studies.compare.histograms import MeasureHistograms
 from studies.compare.table import PolicySummary
 from studies.paper import PAPER_ROWS
+from studies.statistics.ratios import Interval
+
+OUTLINE = "#1a1a1a"
+_PAPER_LABELS = {
+    "TD3": "bottom right",
+    "TD3 + LSTM": "top left",
+    "Fixed Control": "bottom left",
+    "Single Divert": "top right",
+}
+"""Where the names stand beside the paper's points, which lie close together."""
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
 
 
-def draw_ratio_against_propellant(summaries: Sequence[PolicySummary]) -> Figure:
-    """Safe ratio against propellant, with both intervals; the paper's points are open diamonds."""
+def draw_headline(summaries: Sequence[PolicySummary]) -> Figure:
+    """Unsafe share on a logarithmic axis against propellant, with both intervals; the paper's are stars.
+
+    A policy without an unsafe site has no place on such an axis: it stands hollow at half an episode, and its
+    interval reaches down no further.
+    """
     from plotly.graph_objects import Figure, Scatter
 
     figure = Figure()
     for index, summary in enumerate(summaries):
-        propellant, safe = summary.means["propellant_percent"], summary.safe_site
+        propellant, unsafe = summary.means["propellant_percent"], unsafe_percent(summary)
+        shown = unsafe.estimate or 50.0 / summary.episodes
+        marker = marker_style(index) | {"line": {"color": OUTLINE, "width": 1}}
+        if not unsafe.estimate:
+            marker |= {"symbol": f"{marker['symbol']}-open", "line": {"width": 2}}
         figure.add_trace(
             Scatter(
                 x=[propellant.estimate],
-                y=[100.0 * safe.estimate],
+                y=[shown],
                 error_x=_bars([(propellant.estimate, propellant.low, propellant.high)]),
-                error_y=_bars([(100.0 * safe.estimate, 100.0 * safe.low, 100.0 * safe.high)]),
+                error_y=_bars([(shown, _lower_end(unsafe, shown), max(unsafe.high, shown))]),
                 mode="markers",
-                marker=marker_style(index),
+                marker=marker,
                 name=summary.policy,
+                text=[
+                    f"{summary.policy}: {unsafe.estimate:.2f} % unsafe"
+                    f" ({unsafe.low:.2f} to {unsafe.high:.2f}), {propellant.estimate:.2f} % propellant"
+                ],
+                hovertemplate="%{text}<extra></extra>",
             )
         )
     figure.add_trace(
         Scatter(
             x=[row["propellant_percent"] for row in PAPER_ROWS.values()],
-            y=[row["safe_site_percent"] for row in PAPER_ROWS.values()],
+            y=[100.0 - row["safe_site_percent"] for row in PAPER_ROWS.values()],
             text=list(PAPER_ROWS),
-            textposition="top center",
-            textfont={"size": 11, "color": "#555555"},
+            textposition=[_PAPER_LABELS[name] for name in PAPER_ROWS],
+            textfont={"size": 12, "color": "#555555", "shadow": "0 0 3px #fff, 0 0 3px #fff"},
+            cliponaxis=False,
             mode="markers+text",
-            marker={"color": "#555555", "symbol": "diamond-open", "size": 11},
+            marker={"color": "#555555", "symbol": "star-open", "size": 13, "line": {"width": 2}},
             name="the paper",
-            hovertemplate="%{text}<br>%{x} %, %{y} %<extra></extra>",
+            hovertemplate="the paper, %{text}<br>%{y:.1f} % unsafe, %{x} % propellant<extra></extra>",
         )
     )
-    figure.update_layout(showlegend=True, legend={"orientation": "h", "yanchor": "top", "y": -0.2})
-    return _finish(figure, "propellant burnt [%]", "safe site [%]")
+    figure.update_layout(showlegend=True, height=max(460, 140 + 20 * len(summaries)))
+    _finish(figure, "propellant burnt [%]", "unsafe sites [%]")
+    lowest = [_lower_end(unsafe_percent(summary), 50.0 / summary.episodes) for summary in summaries]
+    shares = [*lowest, *(100.0 - row["safe_site_percent"] for row in PAPER_ROWS.values())]
+    burnt = [summary.propellant.estimate for summary in summaries]
+    burnt += [row["propellant_percent"] for row in PAPER_ROWS.values()]
+    figure.update_xaxes(range=[min(burnt) - 1.5, max(burnt) + 2.5])
+    ticks = [value for power in range(-5, 3) for value in (10.0**power, 3.0 * 10.0**power) if value <= 100.0]
+    figure.update_yaxes(
+        type="log",
+        range=[math.log10(0.6 * min(shares)), math.log10(130.0)],
+        tickvals=ticks,
+        ticktext=[f"{value:g}" for value in ticks],
+    )
+    return figure
+
+
+def unsafe_percent(summary: PolicySummary) -> Interval:
+    """[%] share of unsafe sites with Wilson's interval."""
+    safe = summary.safe_site
+    return Interval(*(100.0 * (1.0 - end) for end in (safe.estimate, safe.high, safe.low)))
+
+
+def _lower_end(unsafe: Interval, shown: float) -> float:
+    """Where an interval ends on a logarithmic axis: without an unsafe site, at the mark itself."""
+    return unsafe.low if unsafe.estimate else shown
 
 
 def draw_differences(differences: Sequence[PairedDifference]) -> Figure:
@@ -95,25 +144,32 @@ def draw_differences(differences: Sequence[PairedDifference]) -> Figure:
     return figure
 
 
-def draw_histogram(measure: str, histograms: MeasureHistograms) -> Figure:
-    """Distribution of a measure for each policy, as steps over equal bins; the end bins hold the rest."""
+def draw_distribution(measure: str, histograms: MeasureHistograms) -> Figure:
+    """Cumulative distribution of a measure for each policy: the share of episodes up to each value.
+
+    Counts in bins give it at their edges; the first and the last bin hold what lies beyond.
+    """
     from plotly.graph_objects import Figure, Scatter
 
-    edges = histograms.edges[measure]
-    centers = np.round((edges[:-1] + edges[1:]) / 2.0, 6)
+    edges = np.round(histograms.edges[measure], 6)
     figure = Figure()
     for index, name in enumerate(histograms.policies):
+        counts = np.cumsum(histograms.count(measure, name))
+        share = np.concatenate([[0.0], 100.0 * counts / counts[-1]])
         figure.add_trace(
             Scatter(
-                x=centers.tolist(),
-                y=histograms.count(measure, name).tolist(),
+                x=edges.tolist(),
+                y=np.round(share, 3).tolist(),
                 mode="lines",
-                line={**line_style(index), "shape": "hvh", "width": 1.6},
+                line=line_style(index),
                 name=name,
+                hovertemplate="%{y:.1f} % up to %{x:.4g}",
             )
         )
     figure.update_layout(showlegend=False, height=260)
-    return _finish(figure, label_measure(measure), "episodes")
+    _finish(figure, label_measure(measure), "episodes [%]")
+    figure.update_yaxes(range=[-2.0, 102.0])
+    return figure
 
 
 def _bars(ends: Sequence[tuple[float, float, float]]) -> dict[str, Any]:

@@ -14,7 +14,6 @@ from typing import Annotated
 
 import tyro
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from guidance.console import tolerate_encoding
 from guidance.validation import finite_number
@@ -25,13 +24,16 @@ from hda.task.presets import Preset, find_preset
 from studies.campaign.command_line import choose_policies, open_folder, resumable
 from studies.campaign.episode_files import write_episodes
 from studies.campaign.executor import OpenExecutor, local_processes
-from studies.campaign.monte_carlo import Study, prepare_study
-from studies.campaign.points import find_missing, fly_missing
+from studies.campaign.monte_carlo import Study
 from studies.campaign.provenance import describe_study, write_provenance
 from studies.campaign.run_options import KeepingOptions
 from studies.campaign.study_folder import StudyFolder, open_study_folder
 from studies.compare.differences import compare_pairs, write_paired
-from studies.compare.report import ReportContent, fly_report_flights, write_report
+from studies.compare.display import Phase, show_phase
+from studies.compare.flights import choose_flights, fly_pictures
+from studies.compare.flying import fly_comparison
+from studies.compare.quick import QUICK_EPISODES, QUICK_FOLDER, QUICK_POLICIES, show_report
+from studies.compare.report import ReportContent, write_report
 from studies.compare.scores import StudyScores, score_study
 from studies.compare.table import (
     REFERENCE_POLICY,
@@ -73,6 +75,8 @@ class Comparison(KeepingOptions):
         resume: go on with the study in the folder, which must be the same; begins it where there is none.
         figures: draw the histograms and trajectories.
         report: write report.html, and keep the flights that it shows.
+        quick: a first result: 100 episodes of six policies, in results/quick, without figures; the report
+            is opened where there is a screen. What you ask for besides stays, such as --episodes.
     """
 
     episodes: int = 1000
@@ -92,6 +96,17 @@ class Comparison(KeepingOptions):
     out: Path | None = None
     figures: bool = True
     report: bool = True
+    quick: bool = False
+
+
+def shorten(options: Comparison) -> Comparison:
+    """What `quick` stands for; what the user chose stays."""
+    short = {"episodes": QUICK_EPISODES, "policies": QUICK_POLICIES, "out": QUICK_FOLDER}
+    chosen = {
+        name: value for name, value in short.items() if getattr(options, name) == getattr(Comparison, name)
+    }
+    begun = options.resume or "out" not in chosen
+    return replace(options, **chosen, figures=False, overwrite=options.overwrite or not begun)
 
 
 def plan_study(options: Comparison) -> Study:
@@ -157,19 +172,6 @@ def with_reference(study: Study) -> Study:
     return replace(study, policies=(*study.policies, REFERENCE_POLICY)) if missing else study
 
 
-def fly_with_progress(folder: StudyFolder, options: Comparison) -> None:
-    """Fly what a folder's study still lacks, under a progress bar; every chunk goes to the folder at once."""
-    study = folder.study
-    open_executor, here = choose_executor(options)
-    missing = find_missing(folder)
-    if missing and here:  # the workers of a cluster build the tiles that they meet
-        prepare_study(study, options.workers)
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, transient=True) as progress:
-        task = progress.add_task("episodes", total=study.episodes * len(study.policies))
-        fly_missing(folder, missing, open_executor, options.workers, (progress, task))
-
-
 def summarize_study(study: Study, scores: StudyScores) -> list[PolicySummary]:
     """The line of every policy of the study."""
     return [
@@ -191,17 +193,22 @@ def compare(options: Comparison) -> list[PolicySummary]:
             being written, or a policy or a worker failed.
         OSError: the folder cannot be written.
     """
-    study = plan_study(options)
     existing = options.existing
+    if options.quick:
+        options = shorten(options)
+        existing = options.existing
+    study = plan_study(options)
     choose_executor(options)
     for path in study.paths:
         check_contract(policy_entry(path).make, study.preset)
     out = open_folder(options.out or Path("results") / study.preset.name)
     with open_study_folder(out, with_reference(study), existing) as folder:
-        fly_with_progress(folder, options)
+        fly_comparison(folder, *choose_executor(options), options.workers)
         summaries = write_results(folder, study, options)
     print_table(summaries)
     Console().print(f"results in {out}")
+    if options.quick and options.report and not show_report(out / "report.html"):
+        Console().print(f"open {out / 'report.html'}", soft_wrap=True)
     return summaries
 
 
@@ -228,7 +235,9 @@ def write_results(folder: StudyFolder, study: Study, options: Comparison) -> lis
     if options.figures:
         from studies.compare.figures import draw_figures
 
-        draw_figures(out, study, scores)
+        with show_phase(Console(), Phase("figures", 1)) as display:
+            draw_figures(out, study, scores)
+            display.advance(1)
     if options.report:
         report_study(out, ReportContent(study, scores, summaries, differences, provenance), options.workers)
     write_provenance(out / "provenance.json", provenance)
@@ -236,15 +245,11 @@ def write_results(folder: StudyFolder, study: Study, options: Comparison) -> lis
 
 
 def report_study(out: Path, content: ReportContent, workers: int) -> None:
-    """Fly again what the report shows, under a progress bar, and write it."""
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, transient=True) as progress:
-        task = progress.add_task("report", total=None)
-        flights = fly_report_flights(
-            content,
-            partial(local_processes, workers),
-            out / "trajectories",
-            lambda done, total: progress.update(task, completed=done, total=total),
+    """Fly again what the report shows, and write it."""
+    chosen = choose_flights(content.scores, content.study.policies)
+    with show_phase(Console(), Phase("report", len(chosen))) as display, local_processes(workers) as executor:
+        flights = fly_pictures(
+            content.study, chosen, executor, out / "trajectories", lambda: display.advance(1)
         )
     write_report(out / "report.html", content, flights)
 

@@ -7,23 +7,23 @@ which stands in the file once. The tables read the columns of the files (`COLUMN
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from studies.campaign.executor import OpenExecutor
 from studies.campaign.monte_carlo import Study
 from studies.campaign.score import MEASURE_COLUMNS
 from studies.columns import Column, Output, Row, standing_in
 from studies.compare.charts import (
     draw_differences,
-    draw_histogram,
-    draw_ratio_against_propellant,
+    draw_distribution,
+    draw_headline,
     line_style,
 )
 from studies.compare.differences import DIFFERENCE_COLUMNS, PairedDifference
-from studies.compare.flights import FlightPicture, choose_flights, fly_pictures, picture_ground
+from studies.compare.flights import FlightPicture, picture_ground
+from studies.compare.opening import choose_curves, choose_opening
 from studies.compare.scores import StudyScores
 from studies.compare.table import COLUMNS, REFERENCE_POLICY, PolicySummary, paper_line
 from studies.paper import PAPER_ROWS
@@ -65,29 +65,6 @@ class Cell:
     ranges: tuple[str, ...] = ()
 
 
-def fly_report_flights(
-    content: ReportContent, open_executor: OpenExecutor, folder: Path, on_progress: Callable[[int, int], None]
-) -> list[FlightPicture]:
-    """Fly again the episodes that the report shows; their whole flights go to `folder` as NPZ.
-
-    Args:
-        content: scores and study.
-        open_executor: makes the executor that flies them.
-        folder: for the NPZ files.
-        on_progress: called with (flights done, flights in all).
-    """
-    chosen = choose_flights(content.scores, content.study.policies)
-    done = 0
-
-    def advance() -> None:
-        nonlocal done
-        done += 1
-        on_progress(done, len(chosen))
-
-    with open_executor() as executor:
-        return fly_pictures(content.study, chosen, executor, folder, advance)
-
-
 def write_report(path: Path, content: ReportContent, flights: Sequence[FlightPicture]) -> None:
     """Write the report.
 
@@ -112,6 +89,7 @@ def write_report(path: Path, content: ReportContent, flights: Sequence[FlightPic
 
     study = content.study
     episodes = sorted({flight.episode for flight in flights})
+    opening = choose_opening(flights, content.summaries)
     page = environment.get_template("report.html").render(
         study=study,
         headings=[column.full_title for column in standing_in(COLUMNS, Output.REPORT)],
@@ -120,16 +98,19 @@ def write_report(path: Path, content: ReportContent, flights: Sequence[FlightPic
         reference=REFERENCE_POLICY,
         difference_headings=[column.full_title for column in standing_in(DIFFERENCE_COLUMNS, Output.REPORT)],
         difference_lines=table_lines(DIFFERENCE_COLUMNS, content.differences),
-        styles=[{"name": name, **line_style(k)} for k, name in enumerate(study.policies)],
+        styles=[
+            {"name": name, "shown": name in choose_curves(study.policies), **line_style(k)}
+            for k, name in enumerate(study.policies)
+        ],
         charts=make_charts(content),
         measures=[column.key for column in MEASURE_COLUMNS],
         flights=list(flights),
         grounds={str(episode): picture_ground(study, episode) for episode in episodes},
-        colors={name: line_style(k)["color"] for k, name in enumerate(study.policies)},
+        opening=None if opening is None else asdict(opening),
         provenance=content.provenance,
         provenance_text=json.dumps(content.provenance, indent=1, sort_keys=True, default=str),
         css=source("report.css"),
-        script=source("report.js"),
+        scripts=[source(name) for name in ("tables.js", "charts.js", "flights.js")],
         plotly=Markup(get_plotlyjs().replace("</script", "<\\/script")),
     )
     path.write_text(page, encoding="utf-8")
@@ -143,11 +124,11 @@ def script_json(value: Any) -> str:
 
 def make_charts(content: ReportContent) -> dict[str, Any]:
     """Chart name -> plotly figure as plain JSON; differences only where there is something to compare."""
-    figures = {"ratio-propellant": draw_ratio_against_propellant(content.summaries)}
+    figures = {"headline": draw_headline(content.summaries)}
     if content.differences:
         figures["differences"] = draw_differences(content.differences)
     for column in MEASURE_COLUMNS:
-        figures[f"histogram-{column.key}"] = draw_histogram(column.key, content.scores.histograms)
+        figures[f"distribution-{column.key}"] = draw_distribution(column.key, content.scores.histograms)
     return {name: json.loads(str(figure.to_json())) for name, figure in figures.items()}
 
 

@@ -101,6 +101,29 @@ def test_gains_solve_the_riccati_equation_and_are_stable(
     assert np.abs(np.linalg.eigvals(motion - push @ gains)).max() < 1.0
 
 
+@settings(max_examples=50)
+@given(
+    h=st.floats(0.01, 5.0),
+    position=st.floats(0.01, 10.0),
+    velocity=st.floats(0.01, 10.0),
+    acceleration=st.floats(0.05, 20.0),
+)
+def test_gains_are_those_of_python_control_to_the_bit(
+    h: float, position: float, velocity: float, acceleration: float
+) -> None:
+    import control
+
+    theirs, _, _ = control.dlqr(
+        [[1.0, h], [0.0, 1.0]],
+        [[0.5 * h * h], [h]],
+        np.diag([position**-2, velocity**-2]),
+        [[acceleration**-2]],
+        method="scipy",
+    )
+    ours = tracking_gains(h, TrackingWeights(position, velocity, acceleration))
+    assert tuple(ours) == tuple(np.asarray(theirs)[0])
+
+
 def test_what_is_left_of_a_reference() -> None:
     rng = np.random.default_rng(0)
     reference = make_reference(rng.random((6, 3)), rng.random((6, 3)), 0.5, GRAVITY)

@@ -1,0 +1,143 @@
+"""Flying a comparison before its user's eyes: code is compiled, episodes fly, the table grows.
+
+Nothing that is shown here is written anywhere: the products are made from the folder once all is flown.
+"""
+
+from __future__ import annotations
+
+import os
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from time import perf_counter
+
+from rich.console import Console
+from rich.table import Table
+
+from guidance.kernel import kernel_folder
+from hda.registry import policy_entry
+from studies.campaign.executor import OpenExecutor
+from studies.campaign.monte_carlo import Chunk, Study, fly_chunk, prepare_study
+from studies.campaign.points import describe_retry, find_missing, fly_missing
+from studies.campaign.score import MEASURE_COLUMNS, RATIO_COLUMNS, RunningScore, Score
+from studies.campaign.study_folder import StudyFolder
+from studies.columns import document_cell
+from studies.compare.display import Phase, show_phase
+
+COMPILING_SECONDS = 40.0
+"""[s] about what compiling takes, once for a version of the code; for the display alone."""
+LOADING_SECONDS = 5.0
+"""[s] about what loading compiled code takes."""
+_FEW_CHUNKS = 2  # so few fly sooner than they are rehearsed
+_COLUMNS = [
+    replace(column, by_tile=None)
+    for column in (*RATIO_COLUMNS, *MEASURE_COLUMNS)
+    if column.key in ("safe_site_percent", "success_percent", "propellant_percent", "touchdown_speed_mps")
+]
+
+
+def fly_comparison(folder: StudyFolder, open_executor: OpenExecutor, here: bool, workers: int) -> None:
+    """Fly what a folder's study still lacks; every chunk goes to the folder at once.
+
+    Args:
+        folder: open folder of the study.
+        open_executor: makes what flies the episodes.
+        here: it is this machine: terrain and compiled code are made ready first. The workers of a cluster
+            make what they meet.
+        workers: processes.
+
+    Raises:
+        ValueError: a policy or a worker failed.
+    """
+    console, study, missing = Console(), folder.study, find_missing(folder)
+    if not missing:
+        return
+    seconds = None
+    if here:
+        prepare_study(study, workers)
+        if len(missing) > _FEW_CHUNKS or not is_compiled(study):
+            seconds = rehearse(study, console)
+    lacking = sum(last - first for first, last in missing)
+    kept = study.episodes - lacking
+    at_once = min(workers, os.cpu_count() or 1)
+    expected = None if seconds is None else seconds * lacking / at_once + LOADING_SECONDS * (workers > 1)
+    with show_phase(
+        console, Phase("episodes", study.episodes, expected, completed=kept, kept=kept)
+    ) as display:
+        scores = {name: RunningScore() for name in study.policies}
+
+        def tell(chunk: Chunk) -> None:
+            for name, rows in chunk.rows.items():
+                for row in rows:
+                    scores[name].add(row)
+            so_far = {name: running.collect() for name, running in scores.items()}
+            display.advance(chunk.last - chunk.first, _table_so_far(so_far), _ratios_so_far(so_far))
+            if words := describe_retry(chunk):
+                display.print(words)
+
+        fly_missing(folder, missing, open_executor, workers, tell)
+
+
+def rehearse(study: Study, console: Console) -> float:
+    """Fly the first episode twice with each policy in this process, so that all code is compiled.
+
+    Slow policies are left out. Workers then load what was compiled here, each kernel once.
+
+    Returns:
+        [s] about what an episode of all policies takes, compiled.
+
+    Raises:
+        PolicyError: a policy raised something.
+    """
+    ready = is_compiled(study)
+    title = "loading compiled code" if ready else "compiling, once for this version of the code"
+    expected = LOADING_SECONDS if ready else COMPILING_SECONDS
+    seconds = 0.0
+    names = [name for name in study.policies if not policy_entry(name).slow]
+    with show_phase(console, Phase(title, len(names), expected, steady=False)) as display:
+        for name in names:
+            alone = replace(study, policies=(name,))
+            fly_chunk(alone, 0, 1)
+            began = perf_counter()
+            fly_chunk(alone, 0, 1)
+            seconds += perf_counter() - began
+            display.advance(1)
+    with suppress(OSError):  # nowhere to write: nothing is kept there either
+        kernel_folder().mkdir(parents=True, exist_ok=True)
+        _flown_before().write_text("".join(f"{name}\n" for name in sorted({*_read_flown(), *names})))
+    return seconds
+
+
+def is_compiled(study: Study) -> bool:
+    """Whether each policy has flown at these sources on this machine: what is left is to load its code."""
+    return {name for name in study.policies if not policy_entry(name).slow} <= _read_flown()
+
+
+def _flown_before() -> Path:
+    """Names of the policies that a rehearsal flew, beside the code that it compiled."""
+    return kernel_folder() / "rehearsed.txt"
+
+
+def _read_flown() -> set[str]:
+    try:
+        return set(_flown_before().read_text().split())
+    except (OSError, UnicodeError):
+        return set()
+
+
+def _table_so_far(scores: dict[str, Score]) -> Table:
+    """A line for each policy, over the episodes that this run has flown."""
+    flown = next(iter(scores.values())).episodes
+    table = Table(title=f"after {flown} episodes (95 % intervals)", title_justify="left")
+    table.add_column("policy", no_wrap=True)
+    for column in _COLUMNS:
+        table.add_column(column.title, justify="right", no_wrap=True)
+    for name, score in scores.items():
+        table.add_row(name, *(document_cell(column, score) for column in _COLUMNS))
+    return table
+
+
+def _ratios_so_far(scores: dict[str, Score]) -> str:
+    """The same in a line, shorter."""
+    ratio = _COLUMNS[0]
+    return f"{ratio.title}: " + ", ".join(f"{name} {ratio.text(score)}" for name, score in scores.items())
