@@ -30,6 +30,7 @@ RUNS: dict[str, tuple[list[str], list[str]]] = {
         ["plan.png"],
     ),
     "hda.belief_statistics": (["--tiles", "1"], []),
+    "hda.look_statistics": (["--episodes", "1", "--rays", "32"], []),
     "hda.terrain": (["--size", "200", "--show", "tile.png"], ["tile.png"]),
     "rl.figures": (["gains", "--out", "gains.png"], ["gains.png"]),
     "rl.train": (
@@ -48,6 +49,23 @@ RUNS: dict[str, tuple[list[str], list[str]]] = {
         ["compared/table.csv", "compared/report.html", "compared/figures/histograms.png"],
     ),
     "studies.failures": (["--study", "failing", "--out", "failed"], ["failed/failures.csv"]),
+    "studies.looks": (
+        [
+            "--rays",
+            "64",
+            "--ranges",
+            "300",
+            "--looks",
+            "1",
+            "--tiles",
+            "2",
+            "--workers",
+            "1",
+            "--out",
+            "looked",
+        ],
+        ["looked/table.csv", "looked/looks.png", "looked/calibration.png"],
+    ),
     "studies.memory": (["--train", "list"], []),
     "studies.robustness": (
         [*SMALL, "--levels", "1", "--factors", "thrust-error", "--policies", "no-divert", "--out", "swept"],

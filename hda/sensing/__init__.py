@@ -1,8 +1,8 @@
 """What a look at the ground is.
 
 `lidar` is Algorithm 2, the map of safety with noise on the answer. The others measure: `ranging` sends rays
-(`ray_casting`), `gridding` makes an elevation map of their echoes, and `measured_look` assesses that by
-Algorithm 1, as it would be done on board. It sees tiles (`hda.ground`); the task and the simulator import it.
+(`ray_casting`), `gridding` makes an elevation map of their echoes, `fusion` one of several scans, and
+`measured_look` assesses it by Algorithm 1, as it would be done on board. It sees tiles (`hda.ground`); the task and the simulator import it.
 """
 
 from typing import TYPE_CHECKING
@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from guidance.exports import lazy_exports
 
 if TYPE_CHECKING:
+    from hda.sensing.fusion import fuse_elevations
     from hda.sensing.gridding import ElevationMap, Gridding, PixelGrid, grid_points, lay_grid
     from hda.sensing.lidar import Lidar, look
     from hda.sensing.measured_look import MeasuredGround, assess_elevation, measure_ground
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from hda.sensing.ray_casting import find_ground
 
 _HOMES = {
+    "hda.sensing.fusion": ("fuse_elevations",),
     "hda.sensing.gridding": ("ElevationMap", "Gridding", "PixelGrid", "grid_points", "lay_grid"),
     "hda.sensing.lidar": ("Lidar", "look"),
     "hda.sensing.measured_look": ("MeasuredGround", "assess_elevation", "measure_ground"),
@@ -36,6 +38,7 @@ __all__ = [
     "assess_elevation",
     "draw_scan",
     "find_ground",
+    "fuse_elevations",
     "grid_points",
     "lay_grid",
     "look",

@@ -46,12 +46,20 @@ class MeasuredGround:
         Returns:
             Shape (pixels, pixels), row north, column east.
         """
+        return self._at_pixels(self.probability.astype(np.float32), center, width, pixels)
+
+    def known_map(self, center: Array, width: float, pixels: int) -> NDArray[np.bool_]:
+        """Whether V_P is known at the centres of the pixels of a square look, as `safety_map`."""
+        return self._at_pixels(self.known, center, width, pixels)
+
+    def _at_pixels(self, values: NDArray[Any], center: Array, width: float, pixels: int) -> NDArray[Any]:
+        """Values of the cells that hold the pixels' centres; 0 outside the grid."""
         offset = ((np.arange(pixels) + 0.5) / pixels - 0.5) * width
         rows, columns = self.grid.rows_of(center[1] + offset), self.grid.columns_of(center[0] + offset)
         in_rows = (rows >= 0) & (rows < self.grid.rows)
         in_columns = (columns >= 0) & (columns < self.grid.columns)
-        out = np.zeros((pixels, pixels), dtype=np.float32)
-        out[np.ix_(in_rows, in_columns)] = self.probability[np.ix_(rows[in_rows], columns[in_columns])]
+        out = np.zeros((pixels, pixels), dtype=values.dtype)
+        out[np.ix_(in_rows, in_columns)] = values[np.ix_(rows[in_rows], columns[in_columns])]
         return out
 
 

@@ -143,12 +143,18 @@ class PointCloud:
     deviation: Array
 
 
-class _Aim(NamedTuple):
-    """From the vehicle at the decision to the centre of the scan [m], the scan's width [m], the velocity."""
+class _View(NamedTuple):
+    """Place and velocity at the decision, the scan's centre from there and its width, tangent of the limit.
 
+    `top` is a height [m] that no ground exceeds.
+    """
+
+    position: Array
+    velocity: Array
     offset: Array
     width: float
-    velocity: Array
+    limit: float
+    top: float
 
 
 class _Errors(NamedTuple):
@@ -164,11 +170,10 @@ class _Errors(NamedTuple):
 
 
 class _Timing(NamedTuple):
-    """[s] length of the scan, and time from its end to the decision; and the tangent of the limit of view."""
+    """[s] length of the scan, and time from its end to the decision."""
 
     duration: float
     latency: float
-    limit: float
 
 
 class _Echoes(NamedTuple):
@@ -181,9 +186,7 @@ class _Echoes(NamedTuple):
 @compile_kernel
 def _scan_into(
     elevation: NDArray[np.float32],
-    position: Array,
-    top: float,
-    aim: _Aim,
+    view: _View,
     errors: _Errors,
     timing: _Timing,
     draws: tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]],
@@ -193,7 +196,7 @@ def _scan_into(
     ranges, jitters, dropouts = draws
     rays = ranges.shape[0]
     origin, believed, ray = np.empty(3), np.empty(3), np.empty(3)
-    believed_velocity = aim.velocity + errors.motion
+    believed_velocity = view.velocity + errors.motion
     count = 0
     for i in range(rays):
         for j in range(rays):
@@ -201,12 +204,12 @@ def _scan_into(
                 continue
             age = timing.latency + timing.duration * (1.0 - (i * rays + j + 1.0) / (rays * rays))
             for axis in range(3):
-                origin[axis] = position[axis] - age * aim.velocity[axis]
-                believed[axis] = aim.offset[axis] + age * believed_velocity[axis]
-            believed[0] += ((j + 0.5) / rays - 0.5) * aim.width
-            believed[1] += ((i + 0.5) / rays - 0.5) * aim.width
+                origin[axis] = view.position[axis] - age * view.velocity[axis]
+                believed[axis] = view.offset[axis] + age * believed_velocity[axis]
+            believed[0] += ((j + 0.5) / rays - 0.5) * view.width
+            believed[1] += ((i + 0.5) / rays - 0.5) * view.width
             across = math.sqrt(believed[0] ** 2 + believed[1] ** 2)
-            if across > -timing.limit * believed[2]:
+            if across > -view.limit * believed[2]:
                 continue
             believed /= math.sqrt(across * across + believed[2] ** 2)
             about_x = errors.attitude[0] + errors.jitter * jitters[i, j, 0]
@@ -216,7 +219,7 @@ def _scan_into(
             ray[1] = believed[1] + about_z * believed[0] - about_x * believed[2]
             ray[2] = believed[2] + about_x * believed[1] - about_y * believed[0]
             ray /= math.sqrt(ray[0] ** 2 + ray[1] ** 2 + ray[2] ** 2)
-            distance, east, north = find_ground(elevation, origin, ray, top)
+            distance, east, north = find_ground(elevation, origin, ray, view.top)
             if math.isnan(distance):
                 continue
             cosine = (east * ray[0] + north * ray[1] - ray[2]) / math.sqrt(1.0 + east * east + north * north)
@@ -254,9 +257,14 @@ def scan(
     offset, deviation = np.empty((rays * rays, 3)), np.empty(rays * rays)
     count = _scan_into(
         elevation,
-        state.position,
-        float(np.nanmax(elevation)),
-        _Aim(target - state.position, rays * lidar.ray_spacing(state.position, target), state.velocity),
+        _View(
+            state.position,
+            state.velocity,
+            target - state.position,
+            rays * lidar.ray_spacing(state.position, target),
+            math.tan(lidar.off_nadir_limit),
+            float(np.nanmax(elevation)),
+        ),
         _Errors(
             lidar.pointing_error * draws.attitude,
             lidar.range_bias * draws.bias,
@@ -266,7 +274,7 @@ def scan(
             lidar.pointing_jitter,
             lidar.ray_dropout,
         ),
-        _Timing(lidar.scan_duration, lidar.latency, math.tan(lidar.off_nadir_limit)),
+        _Timing(lidar.scan_duration, lidar.latency),
         (draws.range, draws.jitter, draws.dropout),
         _Echoes(offset, deviation),
     )
