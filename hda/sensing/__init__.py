@@ -2,7 +2,8 @@
 
 `lidar` is Algorithm 2, the map of safety with noise on the answer. The others measure: `ranging` sends rays
 (`ray_casting`), `gridding` makes an elevation map of their echoes, `fusion` one of several scans, and
-`measured_look` assesses it by Algorithm 1, as it would be done on board. It sees tiles (`hda.ground`); the task and the simulator import it.
+`measured_look` assesses it by Algorithm 1, as it would be done on board. It sees tiles (`hda.ground`); the
+task, the policies and the simulator import it.
 """
 
 from typing import TYPE_CHECKING

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from guidance.arrays import Array
 from hda.safety.criteria import SafetyCriteria
+from hda.safety.lander_footprint import make_footprint
 from hda.safety.safety_map import assess_safety
 from hda.sensing.gridding import ElevationMap, PixelGrid, grid_points, lay_grid
 from hda.sensing.ranging import PointCloud, RangingLidar
@@ -64,14 +65,26 @@ class MeasuredGround:
 
 
 def assess_elevation(elevation: ElevationMap, criteria: SafetyCriteria) -> MeasuredGround:
-    """Algorithm 1 on a measured elevation map, each height with its own spread; an own map of any size."""
+    """Algorithm 1 on a measured elevation map, each height with its own spread.
+
+    Where the lander fits on no map of this size, or into one of its cells, nothing is known.
+    """
     grid = elevation.grid
-    span = criteria.footprint_diameter + 3.0 * grid.pixel_size  # surely holds the lander
-    if min(grid.shape) * grid.pixel_size < span:
+    if not _lander_fits(grid, criteria):
         return MeasuredGround(elevation, np.zeros(grid.shape), np.zeros(grid.shape, dtype=np.bool_))
     limits: dict[str, Any] = asdict(criteria) | {"range_noise": elevation.spread}
     safety = assess_safety(elevation.height, grid.pixel_size, **limits)
     return MeasuredGround(elevation, safety.probability, ~np.isnan(safety.slope))
+
+
+def _lander_fits(grid: PixelGrid, criteria: SafetyCriteria) -> bool:
+    """Whether the raster of a grid holds the lander, and tells its pads apart."""
+    if grid.pixel_size >= criteria.footprint_diameter:
+        return False
+    return (
+        min(grid.shape)
+        >= make_footprint(criteria.footprint_diameter, criteria.pad_diameter, grid.pixel_size).span
+    )
 
 
 def measure_ground(

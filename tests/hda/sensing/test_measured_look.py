@@ -77,6 +77,24 @@ def test_the_verdict_is_that_of_algorithm_1_on_the_elevation_map():
     np.testing.assert_array_equal(ground.known, ~np.isnan(expected.slope))
 
 
+@pytest.mark.parametrize(("cells", "known"), [(10, 0), (11, 1), (12, 4)])
+def test_a_map_that_just_holds_the_lander_knows_its_middle(cells: int, known: int):
+    shape = (cells, cells)
+    elevation = ElevationMap(
+        PixelGrid(0, 0, 1.0, *shape), np.zeros(shape), np.full(shape, 0.01), np.ones(shape, np.int32)
+    )
+    assert assess_elevation(elevation, CRITERIA).known.sum() == known
+
+
+def test_cells_that_swallow_the_lander_tell_nothing():
+    shape = (40, 40)
+    elevation = ElevationMap(
+        PixelGrid(0, 0, 5.0, *shape), np.zeros(shape), np.full(shape, 0.01), np.ones(shape, np.int32)
+    )
+    assert not assess_elevation(elevation, replace(CRITERIA, footprint_diameter=4.0)).known.any()
+    assert assess_elevation(elevation, CRITERIA).known.any()
+
+
 def test_a_map_too_small_for_the_lander_knows_nothing():
     shape = (6, 6)
     elevation = ElevationMap(
