@@ -17,7 +17,8 @@ from guidance.arrays import Array
 from guidance.constants import MOON_GRAVITY
 from guidance.lander import Lander
 from guidance.state import State
-from hda.policies.belief import SafetyBelief
+from hda.policies.belief import GroundBelief, SafetyBelief
+from hda.policies.measured_belief import MeasuredBelief
 from hda.policies.site_price import (
     LATTICE,
     HazardAwareWeights,
@@ -27,6 +28,7 @@ from hda.policies.site_price import (
 )
 from hda.policies.surroundings import infer_unseen
 from hda.sensing.lidar import Lidar
+from hda.sensing.ranging import RangingLidar
 from hda.task.observation import Observation, ScenarioView
 from hda.task.rules import Rules
 
@@ -43,15 +45,21 @@ class HazardAwareMemory:
     """
 
     view: ScenarioView
-    belief: SafetyBelief | None = None
+    belief: GroundBelief | None = None
 
 
-def fuse_look(observation: Observation, view: ScenarioView, belief: SafetyBelief | None) -> SafetyBelief:
-    """The belief after a look; the first look fixes the square."""
-    if belief is None:
-        half_side = math.ceil(_SQUARE * observation.width / LATTICE) * LATTICE
+def fuse_look(observation: Observation, view: ScenarioView, belief: GroundBelief | None) -> GroundBelief:
+    """The belief after a look; the first look fixes the square, the sensor the kind of belief."""
+    lidar, half_side = view.lidar, math.ceil(_SQUARE * observation.width / LATTICE) * LATTICE
+    if isinstance(lidar, RangingLidar):
+        if not isinstance(belief, MeasuredBelief):
+            belief = MeasuredBelief.blank(observation.target, half_side)
+        if observation.ground is None:
+            return belief
+        return belief.fused(observation.ground, view.criteria, lidar.gridding.percentile)
+    if not isinstance(belief, SafetyBelief):
         belief = SafetyBelief.blank(observation.target, half_side)
-    return belief.fused(observation, view.lidar)
+    return belief.fused(observation, lidar)
 
 
 @dataclass(frozen=True)
@@ -70,7 +78,7 @@ class HazardAwareSite:
         return HazardAwareMemory(view)
 
     def price(
-        self, observation: Observation, view: ScenarioView, belief: SafetyBelief, within: float = math.inf
+        self, observation: Observation, view: ScenarioView, belief: GroundBelief, within: float = math.inf
     ) -> Array:
         """[kg] J of every cell of the belief's square, shape (n, n); `within` as in `price_sites`."""
         safe = infer_unseen(belief.probability(), belief.seen)
@@ -81,7 +89,7 @@ class HazardAwareSite:
         safe: NDArray[np.float32],
         observation: Observation,
         view: ScenarioView,
-        belief: SafetyBelief,
+        belief: GroundBelief,
         within: float = math.inf,
     ) -> Array:
         """The same where the probability that each cell is safe, shape (n, n), is known."""

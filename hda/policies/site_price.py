@@ -26,7 +26,7 @@ from guidance.arrays import Array
 from guidance.kernel import compile_kernel
 from guidance.two_impulse import divert_cost
 from guidance.validation import finite_number
-from hda.policies.belief import SafetyBelief
+from hda.policies.belief import GroundBelief
 from hda.task.observation import Observation, ScenarioView
 
 LATTICE = 8
@@ -156,9 +156,9 @@ def _smooth_into(safe: NDArray[np.float32], weights: Array, out: NDArray[np.floa
             out[row, column] = total
 
 
-def propellant_map(observation: Observation, view: ScenarioView, belief: SafetyBelief) -> Array:
+def propellant_map(observation: Observation, view: ScenarioView, belief: GroundBelief) -> Array:
     """[kg] estimate for landing at each lattice point of the square, shape (m, m)."""
-    points = np.arange(belief.looks.shape[0] // LATTICE + 2) * float(LATTICE)
+    points = np.arange(belief.side // LATTICE + 2, dtype=np.float64) * LATTICE
     return divert_cost(
         observation.state,
         belief.corner[0] + points,
