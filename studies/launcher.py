@@ -64,6 +64,10 @@ GROUPS: dict[str, dict[str, Command]] = {
         "belief-statistics": Command(
             "hda.belief_statistics", "BeliefStatistics", "what the prior belief knows"
         ),
+        "looks": Command("studies.looks.command", "Looks", "how far a measured look can be trusted"),
+        "look-statistics": Command(
+            "hda.look_statistics", "LookStatistics", "what a measured reading is worth"
+        ),
         "sample-size": Command("studies.sample_size", "SampleSize", "how many episodes a claim needs"),
     },
     "Measure": {
