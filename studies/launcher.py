@@ -64,9 +64,9 @@ GROUPS: dict[str, dict[str, Command]] = {
         "belief-statistics": Command(
             "hda.belief_statistics", "BeliefStatistics", "what the prior belief knows"
         ),
-        "looks": Command("studies.looks.command", "Looks", "how far a measured look can be trusted"),
+        "looks": Command("studies.looks.command", "Looks", "what one measured look is worth"),
         "look-statistics": Command(
-            "hda.look_statistics", "LookStatistics", "what a measured reading is worth"
+            "hda.look_statistics", "LookStatistics", "what the belief knows of measured looks"
         ),
         "sample-size": Command("studies.sample_size", "SampleSize", "how many episodes a claim needs"),
     },

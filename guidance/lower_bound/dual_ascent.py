@@ -194,29 +194,21 @@ def affine_basis(time: float) -> Array:
 
 
 @compile_kernel
-def _shorten(
-    primer: Array,
-    step: Array,
-    basis: Array,
-    time: float,
-    case: DualCase,
-    span: tuple[float, float],
-    out: Array,
-) -> float:
-    """Write the primer part of the way up a step, where D [m/s] lies in a span above that of the start; D."""
-    gradient, low, high = np.empty(basis.shape[0]), 0.0, 1.0
+def _shorten(primer: Array, step: Array, basis: Array, time: float, case: DualCase, enough: float) -> Ascent:
+    """Part of the way up a step along which D [m/s] exceeds what is enough: to where it does so by little."""
+    gradient, out, low, high = np.empty(basis.shape[0]), primer.copy(), 0.0, 1.0
     value = np.inf
     for _ in range(_MOST_HALVINGS):
         share = 0.5 * (low + high)
         _numbers_to_primer(share * step, basis, primer, out)
         value = dual_value(out, time, case, gradient)
-        if span[0] < value < span[1]:
+        if enough < value < _OVERSHOOT * enough:
             break
-        if value > span[0]:
+        if value > enough:
             high = share
         else:
             low = share
-    return value
+    return Ascent(out, value, False)
 
 
 @compile_kernel
@@ -264,9 +256,7 @@ def ascend(
             stalled = True
             break
         if reached > _OVERSHOOT * enough:  # no maximum: a longer primer would be good at this time alone
-            reached = _shorten(primer, step, basis, time, case, (enough, _OVERSHOOT * enough), trial)
-            primer[:], value = trial, reached
-            break
+            return _shorten(primer, step, basis, time, case, enough)
         numbers += step
         primer[:], gradient[:], value = trial, there, reached
         damping = max(0.01 * damping, _LEAST_DAMPING)

@@ -27,6 +27,7 @@ from guidance.kernel import compile_kernel
 from guidance.two_impulse import divert_cost
 from guidance.validation import finite_number
 from hda.policies.belief import GroundBelief
+from hda.policies.summed_area import sum_box, summed_area
 from hda.task.observation import Observation, ScenarioView
 
 LATTICE = 8
@@ -73,13 +74,6 @@ class _Prices(NamedTuple):
     surprise_area: float
     island_area: float
     divert_slope: float
-
-
-class _SafeAreas(NamedTuple):
-    """Integral images of the known and of the unknown safe ground."""
-
-    known: Array
-    unknown: Array
 
 
 class NextLook(NamedTuple):
@@ -169,35 +163,6 @@ def propellant_map(observation: Observation, view: ScenarioView, belief: GroundB
     )
 
 
-def summed_area(density: NDArray[np.float32]) -> Array:
-    """Integral image, shape (n + 1, n + 1): entry (i, j) is the sum over rows below i and columns below j."""
-    out = np.zeros((density.shape[0] + 1, density.shape[1] + 1))
-    _sum_into(density, out)
-    return out
-
-
-@compile_kernel
-def _sum_into(density: NDArray[np.float32], out: Array) -> None:
-    rows, columns = density.shape
-    below = np.zeros(columns)
-    for row in range(rows):
-        total = 0.0
-        for column in range(columns):
-            below[column] += density[row, column]
-            total += below[column]
-            out[row + 1, column + 1] = total
-
-
-@compile_kernel
-def _box(area: Array, row: int, column: int, half: float) -> float:
-    """Sum over the cells within `half` of a cell along each axis."""
-    n = area.shape[0] - 1
-    cells = int(half)
-    low_row, high_row = max(row - cells, 0), min(row + cells + 1, n)
-    low, high = max(column - cells, 0), min(column + cells + 1, n)
-    return area[high_row, high] - area[low_row, high] - area[high_row, low] + area[low_row, low]
-
-
 @compile_kernel
 def _split_by_likelihood(
     safe: NDArray[np.float32], next_look: NextLook, known: NDArray[np.float32], unknown: NDArray[np.float32]
@@ -213,17 +178,27 @@ def _split_by_likelihood(
             unknown[row, column] = safe[row, column] if not likely and seen else 0.0
 
 
-class _Places(NamedTuple):
-    """Where cells lie on the lattice along an axis: the number of the point before each, and the rest."""
+class _Outlook(NamedTuple):
+    """The next look, and integral images of the known and of the unknown safe ground."""
 
+    look: NextLook
+    known: Array
+    unknown: Array
+
+
+class _Lattice(NamedTuple):
+    """Propellant [kg] on the lattice; for each cell along an axis the point before it, and how far beyond."""
+
+    propellant: Array
     point: NDArray[np.int64]
     beyond: Array
 
 
 @compile_kernel
-def _interpolate(propellant: Array, places: _Places, row: int, column: int) -> float:
+def _interpolate(lattice: _Lattice, row: int, column: int) -> float:
     """[kg] bilinear, at a cell's centre."""
-    i, s, j, t = places.point[row], places.beyond[row], places.point[column], places.beyond[column]
+    propellant = lattice.propellant
+    i, s, j, t = lattice.point[row], lattice.beyond[row], lattice.point[column], lattice.beyond[column]
     price = (1.0 - s) * ((1.0 - t) * propellant[i, j] + t * propellant[i, j + 1])
     return price + s * ((1.0 - t) * propellant[i + 1, j] + t * propellant[i + 1, j + 1])
 
@@ -231,8 +206,7 @@ def _interpolate(propellant: Array, places: _Places, row: int, column: int) -> f
 @compile_kernel
 def _price_blindly(
     landing: NDArray[np.float32],
-    propellant: Array,
-    places: _Places,
+    lattice: _Lattice,
     prices: _Prices,
     share: float,
     out: Array,
@@ -241,7 +215,7 @@ def _price_blindly(
     least, n = np.inf, landing.shape[0]
     for row in range(n):
         for column in range(n):
-            price, risk = _interpolate(propellant, places, row, column), 1.0 - landing[row, column]
+            price, risk = _interpolate(lattice, row, column), 1.0 - landing[row, column]
             out[row, column] = price + risk * (prices.divert + prices.failure * share)
             least = min(least, price + risk * (prices.divert + prices.failure))
     return least
@@ -250,26 +224,25 @@ def _price_blindly(
 @compile_kernel
 def _price_cells(
     landing: NDArray[np.float32],
-    areas: _SafeAreas,
-    lattice: tuple[Array, _Places],
-    next_look: NextLook,
+    outlook: _Outlook,
+    lattice: _Lattice,
     prices: _Prices,
     most: float,
     out: Array,
 ) -> None:
     """Raise to J what is priced at no more than `most` where every failure is averted."""
-    propellant, places = lattice
-    height, n = next_look.height, landing.shape[0]
+    next_look, n = outlook.look, landing.shape[0]
+    height = next_look.height
     divert_distance = max(prices.divert_slope * height, 1.0)
     for row in range(n):
         for column in range(n):
             if out[row, column] > most:
                 continue
-            price, risk = _interpolate(propellant, places, row, column), 1.0 - landing[row, column]
+            price, risk = _interpolate(lattice, row, column), 1.0 - landing[row, column]
             across = (column + 0.5 - next_look.east) ** 2 + (row + 0.5 - next_look.north) ** 2
             half_width = next_look.half_width_slope * math.sqrt(across + height * height)
-            exponent = _box(areas.known, row, column, divert_distance) / prices.surprise_area
-            exponent += _box(areas.unknown, row, column, half_width) / prices.island_area
+            exponent = sum_box(outlook.known, row, column, divert_distance) / prices.surprise_area
+            exponent += sum_box(outlook.unknown, row, column, half_width) / prices.island_area
             out[row, column] = price + risk * (prices.divert + prices.failure * math.exp(-exponent))
 
 
@@ -292,7 +265,7 @@ def price_sites(
     """
     n = safe.shape[0]
     down = (np.arange(n) + 0.5) / LATTICE
-    places = _Places(down.astype(np.int64), down - down.astype(np.int64))
+    lattice = _Lattice(propellant, down.astype(np.int64), down - down.astype(np.int64))
     prices = _Prices(
         weights.failure_cost,
         weights.divert_cost,
@@ -301,10 +274,10 @@ def price_sites(
         weights.divert_slope,
     )
     out, landing = np.empty((n, n)), landing_probability(safe, weights.dispersion)
-    least = _price_blindly(landing, propellant, places, prices, 0.0 if next_look.useful else 1.0, out)
+    least = _price_blindly(landing, lattice, prices, 0.0 if next_look.useful else 1.0, out)
     if next_look.useful:
         known, unknown = np.empty_like(safe), np.empty_like(safe)
         _split_by_likelihood(safe, next_look, known, unknown)
-        areas = _SafeAreas(summed_area(known), summed_area(unknown))
-        _price_cells(landing, areas, (propellant, places), next_look, prices, least + within, out)
+        outlook = _Outlook(next_look, summed_area(known), summed_area(unknown))
+        _price_cells(landing, outlook, lattice, prices, least + within, out)
     return out
