@@ -13,10 +13,10 @@ MINIMUM := .venv-minimum
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help setup lint test test-all test-minimum compare demo bench docs clean
+.PHONY: help setup lint test test-all test-minimum compare demo bench results-check docs clean
 
 help:  ## list the targets
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-13s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
 setup: $(VENV)/.installed-dev  ## create .venv with everything that a developer needs
 
@@ -43,6 +43,9 @@ demo: $(VENV)/.installed  ## a first result: 100 episodes, six policies, and the
 
 bench: $(VENV)/.installed  ## measure the speed of the inner loops
 	$(BIN)/python -m studies.bench $(ARGS)
+
+results-check: $(VENV)/.installed-dev  ## compare the smaller tables of docs/results with a fresh run
+	$(BIN)/pytest tests/documentation/test_results.py $(ARGS)
 
 docs: $(VENV)/.installed-docs  ## build the documentation into site/; a warning is an error
 	$(BIN)/zensical build --strict --clean

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from time import perf_counter
+from time import perf_counter, process_time
 
 import numpy as np
 import tyro
@@ -19,7 +19,7 @@ from guidance import solve_pdg, solve_pdg_many
 from guidance.console import tolerate_encoding
 from guidance.descent.residuals import fly_residuals
 from guidance.validation import finite_number
-from hda.flight.episode import fly_legs
+from hda.flight.episode import advance, begin_flight, fly_legs, observe
 from hda.policy import PrivilegedPolicy
 from hda.registry import make_policy
 from hda.task.scenario import sample_scenario
@@ -102,6 +102,26 @@ def measure_steps(options: Bench) -> dict[str, np.ndarray]:
     }
 
 
+def measure_scans(episodes: int) -> dict[str, np.ndarray]:
+    """Processor time [s] of each look of a ranging LIDAR: scan, elevation map, Algorithm 1 on board."""
+    policy, times = make_policy("single-divert"), []
+    assert not isinstance(policy, PrivilegedPolicy)
+    for episode in range(-1, episodes):
+        scenario = sample_scenario("lidar", 0, max(episode, 0), "tuning")
+        memory = policy.begin(scenario.view, scenario.streams.policy())
+        flight, ended = begin_flight(scenario), False
+        while not ended:
+            start = process_time()
+            observation = observe(scenario, flight)
+            taken = process_time() - start
+            decision, memory = policy.decide(observation, memory)
+            step = advance(scenario, flight, decision)
+            flight, ended = step.flight, step.outcome is not None
+            if episode >= 0:
+                times.append(taken)
+    return {"look of a ranging LIDAR (128 x 128 rays), processor time": np.array(times)}
+
+
 def measure_plans(options: Bench) -> dict[str, np.ndarray]:
     """Wall time [s] of a plan to the first target of each episode, and of the flight that checks it."""
     times: list[tuple[float, float]] = []
@@ -142,7 +162,8 @@ def bench(options: Bench) -> tuple[list[Work], list[SpeedRatio]]:
     """
     finite_number("episodes", options.episodes, at_least=1)
     out, console = open_folder(options.out), Console(width=max(Console().width, 120))
-    measured = measure_steps(options) | measure_plans(options) | measure_bulk(options)
+    measured = measure_steps(options) | measure_scans(options.episodes)
+    measured |= measure_plans(options) | measure_bulk(options)
     works = [Work(name, *np.quantile(seconds, (0.5, 0.99))) for name, seconds in measured.items()]
     works += [Work(wall.name, wall.median, max(wall.seconds)) for wall in measure_terrain(options.repeats)]
     ratios = measure_ratios(options.preset)

@@ -38,11 +38,13 @@ GROUPS: dict[str, dict[str, Command]] = {
         ),
         "plan": Command("guidance.pdg.__main__", "PdgCommand", "one least-propellant descent to a site"),
         "terrain": Command("hda.terrain.__main__", "show_terrain", "make a tile of ground, and draw it"),
+        "film": Command("hda.flight.film", "film_flight", "fly an episode, and film it as an animated GIF"),
         "export-c": Command("guidance.export_c.__main__", "ExportCommand", "the planner as one C file"),
     },
     "Learn": {
         "train": Command("rl.train", "Command", "train an agent, and make its weights (extra `train`)"),
         "figures": Command("rl.figures", "Command", "pictures of trainings, gains and looks"),
+        "model-cards": Command("rl.model_cards", "ModelCards", "the shipped weights as a page"),
         "training-speed": Command("rl.training_speed", "TrainingSpeed", "updates a second (extra `train`)"),
     },
     "Study": {
@@ -61,6 +63,10 @@ GROUPS: dict[str, dict[str, Command]] = {
         ),
         "belief-statistics": Command(
             "hda.belief_statistics", "BeliefStatistics", "what the prior belief knows"
+        ),
+        "looks": Command("studies.looks.command", "Looks", "what one measured look is worth"),
+        "look-statistics": Command(
+            "hda.look_statistics", "LookStatistics", "what the belief knows of measured looks"
         ),
         "sample-size": Command("studies.sample_size", "SampleSize", "how many episodes a claim needs"),
     },

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,6 +21,16 @@ from guidance.convex.constraints import Rows
 from guidance.convex.layout import Layout
 from guidance.convex.programme import ConvexSolution
 from guidance.convex.scaling import ScaledProblem
+
+
+class _Move(NamedTuple):
+    """Which rows and stored entries of a family a branch takes, and where its entries stand."""
+
+    entries: Index
+    rows: Index
+    row: Index
+    column: Index
+    cone_size: int
 
 
 @dataclass(frozen=True)
@@ -69,37 +80,49 @@ class Branching:
             aim = origin - numbers.position  # this target as seen from the first
             gravity = scaled[0].gravity  # at the first target, the origin of all
             shared = replace(numbers, position=origin, sight_apex=aim, gravity=gravity)
-            for family in self.constraint_set.families:
+            for place, family in enumerate(self.constraint_set.families):
                 part = family(self.layout, shared)
                 if family is constraints.landing:
                     part = replace(part, bound=np.concatenate([aim, numbers.target_velocity]))
-                moved = self._moved(part, branch)
+                moved = self._moved(part, branch, place)
                 if moved is not None:
                     parts.append(moved)
         return parts
 
-    def _moved(self, part: Rows, branch: int) -> Rows | None:
-        """Rows in the columns of a branch, without the cones that bind the trunk only."""
+    def _moved(self, part: Rows, branch: int, place: int) -> Rows | None:
+        """Rows in the columns of a branch, without the cones that bind the trunk only.
+
+        Which these are depends on the layout alone: it is found once for each branch and place of a family.
+        """
+        key = branch, place
+        if key not in self._moves:
+            self._moves[key] = self._find_move(part, branch)
+        move = self._moves[key]
+        if move is None:
+            return None
+        value, bound = part.value[move.entries], part.bound[move.rows]
+        return Rows(part.name, part.cone, move.cone_size, move.row, move.column, value, bound)
+
+    @cached_property
+    def _moves(self) -> dict[tuple[int, int], _Move | None]:
+        """What `_moved` has found, by branch and place."""
+        return {}
+
+    def _find_move(self, part: Rows, branch: int) -> _Move | None:
         column = self.columns[branch][part.column]
         if branch == 0:
-            return replace(part, column=column)
+            every = np.arange(column.size), np.arange(part.bound.size)
+            return _Move(*every, part.row, column, part.cone_size)
         width = part.cone_size if part.cone == "second_order" else 1
         kept = np.zeros(part.bound.size // width, dtype=np.bool_)
         kept[part.row[column >= self.layout.size] // width] = True
         rows = np.repeat(kept, width)
         if not rows.any():
             return None
-        number = np.cumsum(rows) - 1
-        entries = rows[part.row]
-        return Rows(
-            part.name,
-            part.cone,
-            part.cone_size if part.cone == "second_order" else int(rows.sum()),
-            number[part.row[entries]],
-            column[entries],
-            part.value[entries],
-            part.bound[rows],
-        )
+        entries, chosen = np.flatnonzero(rows[part.row]), np.flatnonzero(rows)
+        row = (np.cumsum(rows) - 1)[part.row[entries]]
+        size = part.cone_size if part.cone == "second_order" else chosen.size
+        return _Move(entries, chosen, row, column[entries], size)
 
 
 class BranchedProgramme:

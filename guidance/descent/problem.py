@@ -142,7 +142,7 @@ class LandingProblem:
     def pull_at_target(self) -> Array:
         """[m/s^2] shape (3,): gravity and the centrifugal acceleration at the target."""
         spin = self.angular_velocity
-        return self.gravity - np.cross(spin, np.cross(spin, self.target))
+        return self.gravity - np.cross(spin, np.cross(spin, self.target)) if self.rotates else self.gravity
 
     @property
     def arrived(self) -> bool:

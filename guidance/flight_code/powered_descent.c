@@ -22,6 +22,7 @@
 #define FIXED 6          /* unknowns of a given time of flight */
 #define MOST_STEPS 30    /* of Newton's method */
 #define MOST_HALVINGS 12
+#define IMPULSE_TIMES 40 /* of flight, tried for two impulses */
 #define MOST_PRIMERS 24  /* of a bound */
 #define CELLS 70         /* of the grid of times, up to the best time */
 #define NEAR 6
@@ -30,6 +31,7 @@
 static const double PI = 3.14159265358979323846;
 static const double LARGEST_NUMBER = 1e9, ROUNDING = 1e-6;
 static const double CONVERGED = 1e-10, LATEST_FIRST_BURN = 0.5, UNIT = 1e-6, MOST_TURN = 0.5;
+static const double LATEST_IMPULSE = 0.9, SHORTEST_IMPULSES = 0.01;
 static const double UNIFORM = 2.5, STRETCH = 1.03, LONGEST = 1e4;
 static const double BEYOND = 1.2, GROWTH = 4.0, EARLIEST = 0.1, IMPULSES = 1.02;
 static const double TOLERANCE = 2e-6, GRANTED = 1e-7, CLOSE = 1.0 - 1e-9;
@@ -375,7 +377,7 @@ static int newton(extremal *x, const primer_problem *problem)
 }
 
 /* First guess: a suicide burn along the vertical, and two sideways impulses, at the start and in it. */
-static int guess(const primer_problem *problem, int first_burn, extremal *x)
+static int guess_suicide_burn(const primer_problem *problem, int first_burn, extremal *x)
 {
     const double *r = problem->position, *v = problem->velocity;
     double g = sqrt(dot(problem->gravity, problem->gravity));
@@ -435,6 +437,53 @@ static int guess(const primer_problem *problem, int first_burn, extremal *x)
     return fabs(dot(q1, q1) - 1.0) < UNIT && fabs(dot(q2, q2) - 1.0) < UNIT;
 }
 
+/* Velocity changes of a ballistic flight that begins and ends with one; their cost, gravity losses included. */
+static double set_impulses(const primer_problem *problem, double time, double first[3], double last[3])
+{
+    const double *g = problem->gravity;
+    for (int axis = 0; axis < 3; axis++) {
+        double there = -problem->position[axis] / time - 0.5 * g[axis] * time;
+        first[axis] = there - problem->velocity[axis];
+        last[axis] = -there - g[axis] * time;
+    }
+    double square = dot(first, first), brake = sqrt(dot(last, last));
+    return sqrt(square) + brake + 0.5 * (sqrt(dot(g, g)) * brake + square / time);
+}
+
+/* Second guess: the cheapest of many ballistic flights between two impulses, each spread over a burn. */
+static int guess_impulses(const primer_problem *problem, extremal *x)
+{
+    const double *r = problem->position, *v = problem->velocity;
+    double pull = sqrt(dot(problem->gravity, problem->gravity));
+    double longest = 2.0 * (sqrt(dot(v, v)) / pull + sqrt(2.0 * sqrt(dot(r, r)) / pull));
+    double first[3], last[3], lowest = INFINITY, best = longest;
+    if (!(longest > 0.0)) {
+        return 0;
+    }
+    for (int k = 0; k < IMPULSE_TIMES; k++) {
+        double time = longest * pow(SHORTEST_IMPULSES, (double)k / (IMPULSE_TIMES - 1));
+        double cost = set_impulses(problem, time, first, last);
+        if (cost < lowest) {
+            lowest = cost;
+            best = time;
+        }
+    }
+    set_impulses(problem, best, first, last);
+    double kick = sqrt(dot(first, first)), brake = sqrt(dot(last, last));
+    if (!(kick > 0.0 && brake > 0.0)) {
+        return 0;
+    }
+    for (int axis = 0; axis < 3; axis++) {
+        x->primer[0][axis] = first[axis] / kick;
+        x->primer[1][axis] = last[axis] / brake;
+    }
+    double final = best + 0.5 * (kick + brake), braking = final - brake;
+    x->times[0] = least(kick, LATEST_IMPULSE * braking);
+    x->times[1] = braking;
+    x->times[2] = final;
+    return 1;
+}
+
 /* The problem with the time of flight as the unit of time. */
 static primer_problem in_units(const primer_problem *problem, double unit)
 {
@@ -449,8 +498,9 @@ static primer_problem in_units(const primer_problem *problem, double unit)
 
 static int solve_primer(const primer_problem *problem, extremal *x)
 {
-    for (int attempt = 0; attempt < 2; attempt++) {
-        if (!guess(problem, attempt == 0, x)) {
+    for (int attempt = 0; attempt < 3; attempt++) {
+        int guessed = attempt < 2 ? guess_suicide_burn(problem, attempt == 0, x) : guess_impulses(problem, x);
+        if (!guessed) {
             continue;
         }
         double unit = x->times[2];

@@ -99,6 +99,8 @@ def guess_impulses(problem: PrimerProblem, x: Extremal) -> bool:
     r, v, g, _ = problem
     pull = math.sqrt(dot(g, g))
     longest = 2.0 * (math.sqrt(dot(v, v)) / pull + math.sqrt(2.0 * math.sqrt(dot(r, r)) / pull))
+    if not longest > 0.0:
+        return False
     first, last = np.empty(3), np.empty(3)
     least, best = math.inf, longest
     for k in range(_TIMES):

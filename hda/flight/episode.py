@@ -21,6 +21,8 @@ from hda.flight.record import EpisodeRecord
 from hda.flight.vehicle import ControlPeriods, FlightErrors, FlightStatus, Segment, fly_interval
 from hda.policy import Decision, Memory, Policy, PrivilegedPolicy
 from hda.sensing.lidar import look
+from hda.sensing.measured_look import MeasuredGround, measure_ground
+from hda.sensing.ranging import RangingLidar, scan
 from hda.task.observation import Observation
 from hda.task.scenario import Scenario, estimated_state, ground_point
 
@@ -82,7 +84,12 @@ def observe(scenario: Scenario, flight: Flight) -> Observation:
     lidar = scenario.preset.lidar
     position = flight.state.position
     aim = ground_point(scenario, flight.target)
-    if lidar.dropout > 0.0 and scenario.streams.map_is_missing(flight.index, lidar.dropout):
+    estimate, width = estimated_state(scenario, flight.state), lidar.width(position, aim)
+    ground = None
+    if isinstance(lidar, RangingLidar):
+        ground = _measure(scenario, lidar, flight, estimate)
+        safety_map = ground.safety_map(flight.target, width, lidar.pixels)
+    elif lidar.dropout > 0.0 and scenario.streams.map_is_missing(flight.index, lidar.dropout):
         safety_map = np.zeros((lidar.pixels, lidar.pixels), dtype=np.float32)
     else:
         noise = scenario.streams.look(flight.index, lidar.pixels)
@@ -90,12 +97,26 @@ def observe(scenario: Scenario, flight: Flight) -> Observation:
     return Observation(
         index=flight.index,
         time=flight.index * scenario.preset.rules.decision_interval,
-        state=estimated_state(scenario, flight.state),
+        state=estimate,
         target=flight.target,
         safety_map=safety_map,
-        width=lidar.width(position, aim),
+        width=width,
         time_to_go=flight.time_to_go,
+        ground=ground,
     )
+
+
+def _measure(scenario: Scenario, lidar: RangingLidar, flight: Flight, estimate: State) -> MeasuredGround:
+    """Scan the ground about the target, and assess it where the vehicle believes it to lie.
+
+    The sensor points relative to the vehicle: an error of the estimated position moves the points with it.
+    """
+    draws = scenario.streams.scan(flight.index, lidar.rays)
+    aim = ground_point(scenario, flight.target)
+    cloud = scan(lidar, scenario.tile.elevation, flight.state, aim, draws)
+    error = estimate.position - flight.state.position
+    aim = aim + error  # the plane's height is believed as wrongly as the vehicle's own
+    return measure_ground(cloud, lidar, estimate.position, aim, scenario.preset.criteria)
 
 
 def advance(scenario: Scenario, flight: Flight, decision: Decision) -> Step:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from guidance.arrays import Array
 from hda.flight.palette import COLORS
 from hda.flight.record import EpisodeRecord
 from hda.ground.tile import Tile
@@ -77,17 +78,28 @@ def draw_ground_track(axis: Axes, record: EpisodeRecord) -> None:
     draw_true_safety(axis, record.scenario.tile)
     for observation in record.observations:
         draw_field_of_view(axis, observation)
-    sites = np.array([record.scenario.nominal_target, *(decision.site for decision in record.decisions)])
+    sites = flown_sites(record)
     axis.plot(record.position[:, 0], record.position[:, 1], color=COLORS[1], label="flight")
     axis.plot(sites[:, 0], sites[:, 1], "o-", color=COLORS[0], markersize=4, linewidth=0.8, label="targets")
     axis.plot(*record.outcome.touchdown[:2], "*", color=COLORS[3], markersize=14, label="touchdown")
-    shown = np.vstack([record.position[:, :2], sites[:, :2]])
-    middle = (shown.min(axis=0) + shown.max(axis=0)) / 2.0
-    half = max(float((shown.max(axis=0) - shown.min(axis=0)).max()) / 2.0 + _MARGIN, _LEAST_SHOWN)
-    axis.set_xlim(middle[0] - half, middle[0] + half)
-    axis.set_ylim(middle[1] - half, middle[1] + half)
+    west, east, south, north = shown_ground(record)
+    axis.set_xlim(west, east)
+    axis.set_ylim(south, north)
     axis.set_title("light: safe; squares: field of view at each look", fontsize="medium")
     axis.legend(loc="upper left", framealpha=0.9)
+
+
+def flown_sites(record: EpisodeRecord) -> Array:
+    """[m] shape (decisions + 1, 3), the first target and then the site of each decision."""
+    return np.array([record.scenario.nominal_target, *(decision.site for decision in record.decisions)])
+
+
+def shown_ground(record: EpisodeRecord) -> tuple[float, float, float, float]:
+    """[m] west, east, south and north end of the square of ground that a flight is shown on."""
+    shown = np.vstack([record.position[:, :2], flown_sites(record)[:, :2]])
+    east, north = (shown.min(axis=0) + shown.max(axis=0)) / 2.0
+    half = max(float((shown.max(axis=0) - shown.min(axis=0)).max()) / 2.0 + _MARGIN, _LEAST_SHOWN)
+    return east - half, east + half, north - half, north + half
 
 
 def draw_true_safety(axis: Axes, tile: Tile) -> None:

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,64 @@ LEVEL_SHARES = np.array([0.8980, 0.0014, 0.0003, 0.0002, 0.0002, 0.0002, 0.0009,
 """Share of the training tiles' ground at each level (`python -m hda.belief_statistics`)."""
 
 _LEAST_DEVIATION = 1e-3  # of a noiseless sensor: a level stands for an interval, not for one number
+
+
+@dataclass(frozen=True)
+class CellSquare:
+    """A square of 1 m cells with sides along the axes; row grows north, column east.
+
+    Attributes:
+        corner: (x, y) of its south-west corner [m], whole numbers.
+        side: cells along each side.
+    """
+
+    corner: tuple[int, int]
+    side: int
+
+    @classmethod
+    def around(cls, center: Array, half_side: int) -> CellSquare:
+        """The cells within `half_side` [m] of `center` along each axis."""
+        return cls((math.floor(center[0]) - half_side, math.floor(center[1]) - half_side), 2 * half_side)
+
+    def cell(self, site: Array) -> tuple[int, int] | None:
+        """(row, column) of the cell under `site`, or None outside the square."""
+        row, column = math.floor(site[1]) - self.corner[1], math.floor(site[0]) - self.corner[0]
+        return (row, column) if 0 <= row < self.side and 0 <= column < self.side else None
+
+    def site(self, row: int, column: int, plane: float) -> Array:
+        """[m] shape (3,), centre of a cell at the height of the target plane."""
+        return np.array([self.corner[0] + column + 0.5, self.corner[1] + row + 0.5, plane])
+
+
+class GroundBelief(Protocol):
+    """What a policy asks of a belief over a square of 1 m cells, however its looks came about."""
+
+    @property
+    def corner(self) -> tuple[int, int]:
+        """(x, y) of the square's south-west corner [m]."""
+        ...
+
+    @property
+    def side(self) -> int:
+        """Cells along each side."""
+        ...
+
+    @property
+    def seen(self) -> NDArray[np.bool_]:
+        """Shape (n, n), whether a cell has been read."""
+        ...
+
+    def probability(self) -> NDArray[np.float32]:
+        """Shape (n, n), probability that each cell is safe, from its own readings alone."""
+        ...
+
+    def cell(self, site: Array) -> tuple[int, int] | None:
+        """(row, column) of the cell under `site`, or None outside the square."""
+        ...
+
+    def site(self, row: int, column: int, plane: float) -> Array:
+        """[m] shape (3,), centre of a cell at the height of the target plane."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,10 +108,15 @@ class SafetyBelief:
     @classmethod
     def blank(cls, center: Array, half_side: int) -> SafetyBelief:
         """Nothing seen yet, over the cells within `half_side` [m] of `center` along each axis."""
-        side = 2 * half_side
-        corner = (math.floor(center[0]) - half_side, math.floor(center[1]) - half_side)
-        shape = (LEVELS.size, side, side)
-        return cls(corner, np.zeros(shape, dtype=np.float32), np.zeros((side, side), dtype=np.uint16))
+        square = CellSquare.around(center, half_side)
+        shape = (square.side, square.side)
+        reading = np.zeros((LEVELS.size, *shape), dtype=np.float32)
+        return cls(square.corner, reading, np.zeros(shape, dtype=np.uint16))
+
+    @property
+    def side(self) -> int:
+        """Cells along each side."""
+        return self.looks.shape[0]
 
     @property
     def seen(self) -> NDArray[np.bool_]:
@@ -88,13 +151,11 @@ class SafetyBelief:
 
     def cell(self, site: Array) -> tuple[int, int] | None:
         """(row, column) of the cell under `site`, or None outside the square."""
-        row, column = math.floor(site[1]) - self.corner[1], math.floor(site[0]) - self.corner[0]
-        n = self.looks.shape[0]
-        return (row, column) if 0 <= row < n and 0 <= column < n else None
+        return CellSquare(self.corner, self.side).cell(site)
 
     def site(self, row: int, column: int, plane: float) -> Array:
         """[m] shape (3,), centre of a cell at the height of the target plane."""
-        return np.array([self.corner[0] + column + 0.5, self.corner[1] + row + 0.5, plane])
+        return CellSquare(self.corner, self.side).site(row, column, plane)
 
 
 @compile_kernel

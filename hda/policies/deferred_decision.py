@@ -21,7 +21,7 @@ from guidance.tracking.regulator import tracking_gains
 from guidance.tracking.soft_landing import SoftLanding, plan_soft_landing, sample_descent
 from guidance.validation import finite_number
 from hda.policies.adjusted_descent import AdjustedDescent
-from hda.policies.belief import SafetyBelief
+from hda.policies.belief import GroundBelief
 from hda.policies.hazard_aware import HazardAwareSite, fuse_look
 from hda.policies.planned_descent import DescentMemory
 from hda.policies.site_price import HazardAwareWeights, landing_probability
@@ -83,7 +83,7 @@ class DeferredDecisionMemory:
 
     view: ScenarioView
     descent: DescentMemory
-    belief: SafetyBelief | None = None
+    belief: GroundBelief | None = None
     committed: bool = False
     parting_time: float | None = None
 
@@ -154,7 +154,7 @@ class DeferredDecisionPolicy:
         present = belief.cell(observation.target)
         if memory.committed and present is not None and landing[present] >= self.options.keep_probability:
             return self._fly_to(observation.target, observation, memory)
-        price = self._ranking().price(observation, memory.view, belief)
+        price = self._ranking().price_by(safe, observation, memory.view, belief)
         candidates = self._choose(price, landing, observation, belief)
         trunk = None if memory.committed else self._defer(observation, candidates, memory)
         if trunk is None:
@@ -173,7 +173,7 @@ class DeferredDecisionPolicy:
         )
 
     def _choose(
-        self, price: Array, landing: NDArray[np.float32], observation: Observation, belief: SafetyBelief
+        self, price: Array, landing: NDArray[np.float32], observation: Observation, belief: GroundBelief
     ) -> Candidates:
         """The best site, then the best of those far enough from all before, and so on."""
         options, price = self.options, price.copy()

@@ -11,12 +11,14 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from guidance.arrays import Array
 from guidance.constants import MOON_GRAVITY
 from guidance.lander import Lander
 from guidance.state import State
-from hda.policies.belief import SafetyBelief
+from hda.policies.belief import GroundBelief, SafetyBelief
+from hda.policies.measured_belief import MeasuredBelief
 from hda.policies.site_price import (
     LATTICE,
     HazardAwareWeights,
@@ -26,6 +28,7 @@ from hda.policies.site_price import (
 )
 from hda.policies.surroundings import infer_unseen
 from hda.sensing.lidar import Lidar
+from hda.sensing.ranging import RangingLidar
 from hda.task.observation import Observation, ScenarioView
 from hda.task.rules import Rules
 
@@ -42,15 +45,21 @@ class HazardAwareMemory:
     """
 
     view: ScenarioView
-    belief: SafetyBelief | None = None
+    belief: GroundBelief | None = None
 
 
-def fuse_look(observation: Observation, view: ScenarioView, belief: SafetyBelief | None) -> SafetyBelief:
-    """The belief after a look; the first look fixes the square."""
-    if belief is None:
-        half_side = math.ceil(_SQUARE * observation.width / LATTICE) * LATTICE
+def fuse_look(observation: Observation, view: ScenarioView, belief: GroundBelief | None) -> GroundBelief:
+    """The belief after a look; the first look fixes the square, the sensor the kind of belief."""
+    lidar, half_side = view.lidar, math.ceil(_SQUARE * observation.width / LATTICE) * LATTICE
+    if isinstance(lidar, RangingLidar):
+        if not isinstance(belief, MeasuredBelief):
+            belief = MeasuredBelief.blank(observation.target, half_side)
+        if observation.ground is None:
+            return belief
+        return belief.fused(observation.ground, view.criteria, lidar.gridding.percentile)
+    if not isinstance(belief, SafetyBelief):
         belief = SafetyBelief.blank(observation.target, half_side)
-    return belief.fused(observation, view.lidar)
+    return belief.fused(observation, lidar)
 
 
 @dataclass(frozen=True)
@@ -68,11 +77,25 @@ class HazardAwareSite:
         load_kernels()
         return HazardAwareMemory(view)
 
-    def price(self, observation: Observation, view: ScenarioView, belief: SafetyBelief) -> Array:
-        """[kg] J of every cell of the belief's square, shape (n, n)."""
+    def price(
+        self, observation: Observation, view: ScenarioView, belief: GroundBelief, within: float = math.inf
+    ) -> Array:
+        """[kg] J of every cell of the belief's square, shape (n, n); `within` as in `price_sites`."""
         safe = infer_unseen(belief.probability(), belief.seen)
+        return self.price_by(safe, observation, view, belief, within)
+
+    def price_by(
+        self,
+        safe: NDArray[np.float32],
+        observation: Observation,
+        view: ScenarioView,
+        belief: GroundBelief,
+        within: float = math.inf,
+    ) -> Array:
+        """The same where the probability that each cell is safe, shape (n, n), is known."""
         next_look = predict_next_look(observation, view, belief.corner, self.weights.commit_time)
-        return price_sites(safe, propellant_map(observation, view, belief), next_look, self.weights)
+        propellant = propellant_map(observation, view, belief)
+        return price_sites(safe, propellant, next_look, self.weights, within)
 
     def select(self, observation: Observation, memory: HazardAwareMemory) -> tuple[Array, HazardAwareMemory]:
         """Fuse the look, price every cell, and move if another gains enough."""
@@ -83,7 +106,7 @@ class HazardAwareSite:
         height = float(observation.state.position[2] - observation.target[2])
         if height <= 0.0 or (not first and observation.time_to_go <= self.weights.commit_time):
             return observation.target, memory
-        price = self.price(observation, view, belief)
+        price = self.price(observation, view, belief, self.weights.switch_gain)
         best = divmod(int(np.argmin(price)), price.shape[1])
         present = belief.cell(observation.target)
         if present is not None and price[present] <= price[best] + self.weights.switch_gain:

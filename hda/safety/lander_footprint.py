@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,6 +68,7 @@ def raster_circle(radius: int) -> list[tuple[int, int]]:
     return sorted(quarter, key=lambda cell: math.atan2(cell[0], cell[1]))
 
 
+@lru_cache(maxsize=32)
 def make_footprint(footprint_diameter: float, pad_diameter: float, pixel_size: float) -> LanderFootprint:
     """Set a lander on a raster. Lengths in metres.
 

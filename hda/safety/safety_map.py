@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numba
 import numpy as np
@@ -20,7 +21,14 @@ from guidance.kernel import compile_parallel_kernel
 from guidance.validation import finite_number
 from hda.safety.criteria import DEFAULT_CRITERIA, SafetyCriteria
 from hda.safety.lander_footprint import LanderFootprint, make_footprint
-from hda.safety.stable_planes import FootprintCells, RasterLimits, WorstCase, assess_rows
+from hda.safety.stable_planes import (
+    FootprintCells,
+    RasterLimits,
+    WorstCase,
+    assess_rows,
+    assess_rows_on_one_core,
+)
+from hda.safety.uncertain_heights import score_sites
 
 HIGHEST = 1e9
 """[m] No ground is higher or deeper: such a number is a no-data value that nobody declared."""
@@ -55,7 +63,7 @@ def assess_safety(
     pad_diameter: float = DEFAULT_CRITERIA.pad_diameter,
     max_slope: float = DEFAULT_CRITERIA.max_slope,
     max_roughness: float = DEFAULT_CRITERIA.max_roughness,
-    range_noise: float = DEFAULT_CRITERIA.range_noise,
+    range_noise: float | ArrayLike = DEFAULT_CRITERIA.range_noise,
 ) -> SafetyMap:
     """Assess every cell of a DEM as a landing site: Algorithm 1, worst case over all pad orientations.
 
@@ -74,29 +82,59 @@ def assess_safety(
         pad_diameter: [m].
         max_slope: [rad].
         max_roughness: [m].
-        range_noise: [m], one standard deviation.
+        range_noise: [m], one standard deviation; of each cell's own height where it is an array of the
+            shape of `dem`. The probability is then that of the cell whose height above the limit is greatest
+            in its own deviations; holes may be NaN in both.
 
     Raises:
         ValueError: an argument is out of range, `dem` is not two-dimensional, holds infinities or is smaller
             than the lander, or the lander is too small for the pixel size.
     """
-    criteria = SafetyCriteria(footprint_diameter, pad_diameter, max_slope, max_roughness, range_noise)
+    common: Any = range_noise if np.ndim(range_noise) == 0 else 0.0
+    criteria = SafetyCriteria(footprint_diameter, pad_diameter, max_slope, max_roughness, common)
     pixel_size = finite_number("pixel_size", pixel_size, above=0.0)
     elevation = elevation_array(dem)
     footprint = _fit_footprint(criteria, pixel_size, elevation.shape)
     hole = np.isnan(elevation)
     elevation[hole] = 0.0  # any number: what it touches is marked unknown below
-    slope, roughness, excess = _worst_case(elevation, footprint, pixel_size, criteria.max_roughness)
+    noise = None if np.ndim(range_noise) == 0 else _cell_noise(range_noise, hole)
+    pad_map = _pad_map(elevation, footprint)
+    cells = FootprintCells(footprint.pads, footprint.first_strip, footprint.strips, footprint.half_size)
+    limits = RasterLimits(pixel_size, criteria.max_roughness)
+    worst = WorstCase(*(np.full(elevation.shape, np.nan) for _ in WorstCase._fields))
+    assess = assess_rows if noise is None else assess_rows_on_one_core  # on board there is one
+    assess(elevation, pad_map, cells, limits, worst)
     known = _known_sites(hole, footprint)
-    slope[~known] = np.nan
-    roughness[~known] = np.nan
+    worst.slope[~known] = np.nan
+    worst.roughness[~known] = np.nan
     # A comparison with NaN is False: unknown sites are unsafe.
-    deterministic = (slope <= criteria.max_slope) & (roughness <= criteria.max_roughness)
-    if criteria.range_noise == 0.0:
+    deterministic = (worst.slope <= criteria.max_slope) & (worst.roughness <= criteria.max_roughness)
+    if noise is not None:
+        probability = np.zeros(elevation.shape)
+        score_sites((elevation, pad_map, noise), cells, limits, criteria.max_slope, worst, probability)
+    elif criteria.range_noise == 0.0:
         probability = deterministic.astype(np.float64)
     else:
-        probability = _probability(slope, excess, criteria.max_slope, criteria.range_noise)
-    return SafetyMap(deterministic, probability, slope, roughness)
+        probability = _probability(worst.slope, worst.excess, criteria.max_slope, criteria.range_noise)
+    return SafetyMap(deterministic, probability, worst.slope, worst.roughness)
+
+
+def _cell_noise(range_noise: ArrayLike, hole: NDArray[np.bool_]) -> Array:
+    """Each cell's own deviation [m], 0 in holes.
+
+    Raises:
+        ValueError: it has another shape than the map, or is negative or not finite where the ground is known.
+    """
+    try:
+        noise = np.array(range_noise, dtype=np.float64, order="C")
+    except (TypeError, ValueError) as error:
+        raise ValueError("range_noise must be a number or an array of numbers") from error
+    if noise.shape != hole.shape:
+        raise ValueError(f"range_noise must have the shape of dem, {hole.shape}, got {noise.shape}")
+    noise[hole] = 0.0
+    if not (np.isfinite(noise).all() and (noise >= 0.0).all()):
+        raise ValueError("range_noise must be finite and at least 0 in every known cell")
+    return noise
 
 
 def elevation_array(dem: ArrayLike) -> Array:
@@ -160,23 +198,13 @@ def _known_sites(hole: NDArray[np.bool_], footprint: LanderFootprint) -> NDArray
     return known
 
 
-def _worst_case(
-    elevation: Array, footprint: LanderFootprint, pixel_size: float, max_roughness: float
-) -> WorstCase:
-    pad_map = elevation
-    if footprint.pad_disc.size > 1:
-        from scipy.ndimage import maximum_filter
+def _pad_map(elevation: Array, footprint: LanderFootprint) -> Array:
+    """[m] highest ground under a pad centred on each cell."""
+    if footprint.pad_disc.size == 1:
+        return elevation
+    from scipy.ndimage import maximum_filter
 
-        pad_map = maximum_filter(elevation, footprint=footprint.pad_disc, mode="nearest")
-    worst = WorstCase(*(np.full(elevation.shape, np.nan) for _ in WorstCase._fields))
-    assess_rows(
-        elevation,
-        pad_map,
-        FootprintCells(footprint.pads, footprint.first_strip, footprint.strips, footprint.half_size),
-        RasterLimits(pixel_size, max_roughness),
-        worst,
-    )
-    return worst
+    return maximum_filter(elevation, footprint=footprint.pad_disc, mode="nearest")
 
 
 @compile_parallel_kernel

@@ -19,7 +19,7 @@ COLUMN_BLOCK = 256  # sites of a row worked on together; their buffers stay in t
 
 
 @compile_kernel
-def _plane_gradients(pad_map, row, start, n, north, east, buffer):
+def plane_gradients(pad_map, row, start, n, north, east, buffer):
     """Gradients [m per cell] of the two stable planes and the centre's height, for `n` sites of a row."""
     z0 = pad_map[row + north, start + east : start + east + n]
     z1 = pad_map[row + east, start - north : start - north + n]
@@ -89,11 +89,16 @@ class WorstCase(NamedTuple):
     excess: Array
 
 
-@compile_parallel_kernel
-def assess_rows(
-    elevation: Array, pad_map: Array, footprint: FootprintCells, limits: RasterLimits, worst: WorstCase
+@compile_kernel
+def _assess_row(
+    row: int,
+    elevation: Array,
+    pad_map: Array,
+    footprint: FootprintCells,
+    limits: RasterLimits,
+    worst: WorstCase,
 ) -> None:
-    """Fill the three maps of `worst`, row by row: cells do not depend on one another.
+    """Fill one row of the three maps of `worst`.
 
     For an orientation, with pads 0 to 3 at opposite corners 0-2 and 1-3 and R pads' distance from the centre,
     the plane through the higher diagonal has along it the gradient (z0 - z2) / 2R and across it (z1 - h) / R
@@ -102,36 +107,55 @@ def assess_rows(
     pads, first_strip, strips, half_size = footprint
     pixel_size, max_roughness = limits
     slope, roughness, excess = worst
-    rows, columns = elevation.shape
-    for row in numba.prange(half_size, rows - half_size):
-        buffer = np.empty((9, COLUMN_BLOCK))
-        for start in range(half_size, columns - half_size, COLUMN_BLOCK):
-            n = min(COLUMN_BLOCK, columns - half_size - start)
-            steepest, roughest, most = slope[row, start:], roughness[row, start:], excess[row, start:]
+    columns = elevation.shape[1]
+    buffer = np.empty((9, COLUMN_BLOCK))
+    for start in range(half_size, columns - half_size, COLUMN_BLOCK):
+        n = min(COLUMN_BLOCK, columns - half_size - start)
+        steepest, roughest, most = slope[row, start:], roughness[row, start:], excess[row, start:]
+        for i in range(n):
+            steepest[i], roughest[i], most[i] = 0.0, -np.inf, -np.inf
+        for k in range(pads.shape[0]):
+            plane_gradients(pad_map, row, start, n, pads[k, 0], pads[k, 1], buffer)
+            _highest_ground(elevation, row, start, n, strips[first_strip[k] : first_strip[k + 1]], buffer)
+            east_a, north_a, east_b, north_b, centre = (
+                buffer[0],
+                buffer[1],
+                buffer[2],
+                buffer[3],
+                buffer[4],
+            )
+            high_a, high_b = buffer[5], buffer[6]
             for i in range(n):
-                steepest[i], roughest[i], most[i] = 0.0, -np.inf, -np.inf
-            for k in range(pads.shape[0]):
-                _plane_gradients(pad_map, row, start, n, pads[k, 0], pads[k, 1], buffer)
-                _highest_ground(elevation, row, start, n, strips[first_strip[k] : first_strip[k + 1]], buffer)
-                east_a, north_a, east_b, north_b, centre = (
-                    buffer[0],
-                    buffer[1],
-                    buffer[2],
-                    buffer[3],
-                    buffer[4],
+                squared_a = (east_a[i] ** 2 + north_a[i] ** 2) / pixel_size**2
+                squared_b = (east_b[i] ** 2 + north_b[i] ** 2) / pixel_size**2
+                secant_a, secant_b = math.sqrt(1.0 + squared_a), math.sqrt(1.0 + squared_b)
+                above_a, above_b = high_a[i] - centre[i], high_b[i] - centre[i]
+                steepest[i] = max(steepest[i], max(squared_a, squared_b))
+                roughest[i] = max(roughest[i], max(above_a / secant_a, above_b / secant_b))
+                margin_a, margin_b = (
+                    above_a - max_roughness * secant_a,
+                    above_b - max_roughness * secant_b,
                 )
-                high_a, high_b = buffer[5], buffer[6]
-                for i in range(n):
-                    squared_a = (east_a[i] ** 2 + north_a[i] ** 2) / pixel_size**2
-                    squared_b = (east_b[i] ** 2 + north_b[i] ** 2) / pixel_size**2
-                    secant_a, secant_b = math.sqrt(1.0 + squared_a), math.sqrt(1.0 + squared_b)
-                    above_a, above_b = high_a[i] - centre[i], high_b[i] - centre[i]
-                    steepest[i] = max(steepest[i], max(squared_a, squared_b))
-                    roughest[i] = max(roughest[i], max(above_a / secant_a, above_b / secant_b))
-                    margin_a, margin_b = (
-                        above_a - max_roughness * secant_a,
-                        above_b - max_roughness * secant_b,
-                    )
-                    most[i] = max(most[i], max(margin_a, margin_b))
-            for i in range(n):
-                steepest[i] = math.atan(math.sqrt(steepest[i]))
+                most[i] = max(most[i], max(margin_a, margin_b))
+        for i in range(n):
+            steepest[i] = math.atan(math.sqrt(steepest[i]))
+
+
+@compile_parallel_kernel
+def assess_rows(
+    elevation: Array, pad_map: Array, footprint: FootprintCells, limits: RasterLimits, worst: WorstCase
+) -> None:
+    """Fill the three maps of `worst`, row by row over the cores: cells do not depend on one another."""
+    half_size = footprint.half_size
+    for row in numba.prange(half_size, elevation.shape[0] - half_size):
+        _assess_row(row, elevation, pad_map, footprint, limits, worst)
+
+
+@compile_kernel
+def assess_rows_on_one_core(
+    elevation: Array, pad_map: Array, footprint: FootprintCells, limits: RasterLimits, worst: WorstCase
+) -> None:
+    """The same on one core: for a map so small that waking the others costs more than it spares."""
+    half_size = footprint.half_size
+    for row in range(half_size, elevation.shape[0] - half_size):
+        _assess_row(row, elevation, pad_map, footprint, limits, worst)

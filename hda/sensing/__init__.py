@@ -1,7 +1,9 @@
 """What a look at the ground is.
 
-Algorithm 2: the map of safety that the LIDAR gives around a target, with its noise and its limits of view.
-It sees tiles (`hda.ground`); the task and the simulator import it.
+`lidar` is Algorithm 2, the map of safety with noise on the answer. The others measure: `ranging` sends rays
+(`ray_casting`), `gridding` makes an elevation map of their echoes, `fusion` one of several scans, and
+`measured_look` assesses it by Algorithm 1, as it would be done on board. It sees tiles (`hda.ground`); the
+task, the policies and the simulator import it.
 """
 
 from typing import TYPE_CHECKING
@@ -9,18 +11,40 @@ from typing import TYPE_CHECKING
 from guidance.exports import lazy_exports
 
 if TYPE_CHECKING:
+    from hda.sensing.fusion import fuse_elevations
+    from hda.sensing.gridding import ElevationMap, Gridding, PixelGrid, grid_points, lay_grid
     from hda.sensing.lidar import Lidar, look
+    from hda.sensing.measured_look import MeasuredGround, assess_elevation, measure_ground
+    from hda.sensing.ranging import PointCloud, RangingLidar, ScanDraws, draw_scan, scan
+    from hda.sensing.ray_casting import find_ground
 
 _HOMES = {
-    "hda.sensing.lidar": (
-        "Lidar",
-        "look",
-    ),
+    "hda.sensing.fusion": ("fuse_elevations",),
+    "hda.sensing.gridding": ("ElevationMap", "Gridding", "PixelGrid", "grid_points", "lay_grid"),
+    "hda.sensing.lidar": ("Lidar", "look"),
+    "hda.sensing.measured_look": ("MeasuredGround", "assess_elevation", "measure_ground"),
+    "hda.sensing.ranging": ("PointCloud", "RangingLidar", "ScanDraws", "draw_scan", "scan"),
+    "hda.sensing.ray_casting": ("find_ground",),
 }
 
 __all__ = [
+    "ElevationMap",
+    "Gridding",
     "Lidar",
+    "MeasuredGround",
+    "PixelGrid",
+    "PointCloud",
+    "RangingLidar",
+    "ScanDraws",
+    "assess_elevation",
+    "draw_scan",
+    "find_ground",
+    "fuse_elevations",
+    "grid_points",
+    "lay_grid",
     "look",
+    "measure_ground",
+    "scan",
 ]
 
 __getattr__, __dir__ = lazy_exports(

@@ -11,7 +11,11 @@ from numpy.typing import NDArray
 from guidance.arrays import Array
 from guidance.lander import Lander
 from guidance.state import State
+from hda.safety.criteria import DEFAULT_CRITERIA, SafetyCriteria
+from hda.sensing.gridding import PixelGrid
 from hda.sensing.lidar import Lidar
+from hda.sensing.measured_look import MeasuredGround
+from hda.sensing.ranging import RangingLidar
 from hda.task.rules import Rules
 
 
@@ -25,13 +29,15 @@ class ScenarioView:
         nominal_target: [m] shape (3,), the first target, on the target plane.
         rules: timing, bounds of the dispersions, judgement.
         lidar: the sensor, with its known noise.
+        criteria: what the lander demands of its ground.
     """
 
     lander: Lander
     gravity: Array
     nominal_target: Array
     rules: Rules
-    lidar: Lidar
+    lidar: Lidar | RangingLidar
+    criteria: SafetyCriteria = DEFAULT_CRITERIA
 
     @property
     def decision_interval(self) -> float:
@@ -58,9 +64,12 @@ class Observation:
         time: [s] since the start.
         state: estimated position, velocity and mass.
         target: [m] shape (3,), current target: the centre of the look.
-        safety_map: shape (n, n), observed probability of safety, row i grows north, column j east.
+        safety_map: shape (n, n), observed probability of safety, row i grows north, column j east. Of a
+            ranging LIDAR it is Algorithm 1's verdict on the measured ground, 0 where that is not known.
         width: [m] side of the square look.
         time_to_go: [s] what remains of the commanded time to go.
+        ground: what a ranging LIDAR measured, in the frame of the estimated state; None where the sensor
+            gives the map alone.
     """
 
     index: int
@@ -70,11 +79,27 @@ class Observation:
     safety_map: NDArray[np.float32]
     width: float
     time_to_go: float
+    ground: MeasuredGround | None = None
 
     @property
     def has_map(self) -> bool:
-        """Whether any ground was seen: a look that came without a map reads 0 everywhere."""
+        """Whether any ground may be safe: a look that came without a map reads 0 everywhere."""
         return bool(self.safety_map.any())
+
+    @property
+    def elevation(self) -> Array | None:
+        """[m] shape (rows, columns), measured heights, NaN in holes; None where there are no ranges."""
+        return None if self.ground is None else self.ground.elevation.height
+
+    @property
+    def elevation_spread(self) -> Array | None:
+        """[m] shape (rows, columns), one standard deviation of each measured height; or None."""
+        return None if self.ground is None else self.ground.elevation.spread
+
+    @property
+    def elevation_grid(self) -> PixelGrid | None:
+        """Where the cells of `elevation` lie; or None."""
+        return None if self.ground is None else self.ground.grid
 
     @property
     def pixel_size(self) -> float:

@@ -1,8 +1,11 @@
 """What a preset is, and the named settings of the benchmark.
 
-The numbers of `paper` and `hard` come from `python -m studies.calibrate` on the tuning tiles; the README
-shows what they give beside the paper's row. `partial` is the ground of `paper` seen badly, so that one look
-is not enough: five times its map noise, two looks of five without a map, and errors of the estimated state.
+The numbers of `paper` and `hard` come from `python -m studies.calibrate` on the tuning tiles;
+docs/explanation/calibration.md shows what they give beside the paper's row. `partial` is the ground of
+`paper` seen badly, so that one look is not enough: five times its map noise, two looks of five without a map,
+and errors of the estimated state.
+On `lidar` and `lidar-coarse` a look is no longer the true map with noise on it: ranges are measured to the
+same ground, 128 or 64 rays a side, gridded, and assessed on board.
 """
 
 from __future__ import annotations
@@ -15,6 +18,7 @@ from guidance.validation import finite_number, finite_vector, unknown_name
 from hda.ground.own_terrain import OwnTerrain
 from hda.safety.criteria import SafetyCriteria
 from hda.sensing.lidar import Lidar
+from hda.sensing.ranging import RangingLidar
 from hda.task.rules import Rules, StartConditions
 from hda.terrain.generator import TerrainParameters
 from hda.terrain.islands import IslandField
@@ -43,7 +47,7 @@ class Preset:
     terrain: TerrainParameters | OwnTerrain = field(default_factory=TerrainParameters)
     criteria: SafetyCriteria = field(default_factory=SafetyCriteria)
     start: StartConditions = field(default_factory=StartConditions)
-    lidar: Lidar = field(default_factory=Lidar)
+    lidar: Lidar | RangingLidar = field(default_factory=Lidar)
     rules: Rules = field(default_factory=Rules)
     lander: Lander = PAPER_LANDER
     gravity: tuple[float, float, float] = MOON_GRAVITY
@@ -70,6 +74,8 @@ PRESETS: dict[str, Preset] = {
             lidar=Lidar(noise=0.25, dropout=0.4),
             rules=Rules(navigation_position_error=0.5, navigation_velocity_error=0.1),
         ),
+        Preset(name="lidar", terrain=PAPER_TERRAIN, lidar=RangingLidar(rays=128)),
+        Preset(name="lidar-coarse", terrain=PAPER_TERRAIN, lidar=RangingLidar(rays=64)),
     )
 }
 """The presets by name."""

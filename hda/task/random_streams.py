@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from guidance.arrays import Array
+from hda.sensing.ranging import ScanDraws, draw_scan
 
 _SCENARIO, _SENSOR, _ACTUATOR, _POLICY = range(4)
 _WORD = 2**32
@@ -66,6 +67,10 @@ class EpisodeStreams:
     def look(self, index: int, pixels: int) -> NDArray[np.float32]:
         """Standard normal noise of look `index`, shape (pixels, pixels)."""
         return self._generator(_SENSOR, index).standard_normal((pixels, pixels), dtype=np.float32)
+
+    def scan(self, index: int, rays: int) -> ScanDraws:
+        """All that chance does to the scan of look `index`, of rays x rays."""
+        return draw_scan(self._generator(_SENSOR, index, 2), rays)
 
     def navigation_error(self, position_error: float, velocity_error: float) -> Array:
         """Error of the estimated position [m] and velocity [m/s], shape (6,), one for the whole episode."""

@@ -56,6 +56,7 @@ class Scenario:
             nominal_target=self.nominal_target.copy(),
             rules=self.preset.rules,
             lidar=self.preset.lidar,
+            criteria=self.preset.criteria,
         )
 
 

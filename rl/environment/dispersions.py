@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, fields, replace
 
 from guidance.validation import finite_number
+from hda.sensing.lidar import Lidar
+from hda.sensing.ranging import RangingLidar
 from hda.task.presets import Preset
 from hda.task.rules import Range
 
@@ -23,9 +25,10 @@ class Dispersions:
         approach_spread: spread of the horizontal velocity's direction about that of the target.
         mass: spread of the initial mass (none in the paper's setting).
         target_area: spread of the first target over the tile; 0 may find no target that is hazardous enough.
-        map_noise: noise of the observed safety map.
+        map_noise: noise of the observed safety map; of the ranges, where the sensor gives these.
         thrust_error: relative error of the applied thrust.
-        map_dropout: probability of a look without a map (none in the paper's setting); at most 1 results.
+        map_dropout: probability of a look without a map, or of a ray without an echo (none in the paper's
+            setting); at most 1 results.
         navigation_position: error of the estimated position (none in the paper's setting).
         navigation_velocity: error of the estimated velocity (none in the paper's setting).
 
@@ -58,12 +61,11 @@ class Dispersions:
         start = preset.start
         ranges = {name: _scaled(getattr(start, name), getattr(self, name)) for name in _START_RANGES}
         spread = start.approach_spread * self.approach_spread
-        lidar, rules = preset.lidar, preset.rules
-        dropout = min(1.0, lidar.dropout * self.map_dropout)
+        rules = preset.rules
         return replace(
             preset,
             start=replace(start, **ranges, approach_spread=spread),
-            lidar=replace(lidar, noise=lidar.noise * self.map_noise, dropout=dropout),
+            lidar=self._disperse(preset.lidar),
             rules=replace(
                 rules,
                 thrust_error=rules.thrust_error * self.thrust_error,
@@ -71,6 +73,14 @@ class Dispersions:
                 navigation_velocity_error=rules.navigation_velocity_error * self.navigation_velocity,
             ),
         )
+
+    def _disperse(self, lidar: Lidar | RangingLidar) -> Lidar | RangingLidar:
+        """The sensor with its noise and its dropout scaled: of the map, or of the ranges."""
+        if isinstance(lidar, RangingLidar):
+            lost = min(1.0, lidar.ray_dropout * self.map_dropout)
+            return replace(lidar, range_noise=lidar.range_noise * self.map_noise, ray_dropout=lost)
+        dropout = min(1.0, lidar.dropout * self.map_dropout)
+        return replace(lidar, noise=lidar.noise * self.map_noise, dropout=dropout)
 
 
 def _scaled(bounds: Range, factor: float) -> Range:

@@ -4,7 +4,8 @@ A landing on hazardous ground is followed back: was the site itself safe, had a 
 ground, was some of it within reach at that look (the outer bound of
 `hda.policies.privileged.knowable_ground`, so `out of reach` is proved), and what did the last look that
 read the site say of it? Beside the cause stand the single changes that would have made the episode a
-success: the same episode flown again with a noiseless map, an exact engine, or exact navigation. Where no
+success: the same episode flown again with a noiseless map (or with twice the rays, where the sensor gives
+ranges), an exact engine, or exact navigation. Where no
 safe ground had been seen such a success is another draw of luck.
 """
 
@@ -22,6 +23,8 @@ from hda.flight.episode import fly
 from hda.flight.outcome import Ending
 from hda.flight.record import EpisodeRecord
 from hda.policies.privileged.knowable_ground import KnowableGround
+from hda.sensing.lidar import Lidar
+from hda.sensing.ranging import RangingLidar
 from hda.task.observation import Observation
 from hda.task.presets import Preset
 from hda.task.scenario import Scenario, ground_point
@@ -88,7 +91,7 @@ def read_pixels(
     """Cells that a look's pixels show: rows (n,), columns (n,), and which pixels (n, n) read the ground.
 
     Row i of the look shows row rows[i] of the tile. A pixel too far from the vertical, outside the map, or in
-    a look without a map reads nothing.
+    a look without a map reads nothing; nor does one of a ranging LIDAR where Algorithm 1 has a hole.
     """
     error = scenario.navigation_error
     aim = ground_point(scenario, observation.target)
@@ -99,8 +102,12 @@ def read_pixels(
     rows, columns = np.floor(y).astype(int), np.floor(x).astype(int)
     height, width = scenario.tile.deterministic.shape
     inside = ((rows >= 0) & (rows < height))[:, None] & ((columns >= 0) & (columns < width))[None, :]
-    lost = not observation.safety_map.any() and scenario.preset.lidar.dropout > 0.0
-    return rows, columns, (across <= limit * limit) & inside & (not lost)
+    read = (across <= limit * limit) & inside
+    if observation.ground is not None:
+        read &= observation.ground.known_map(observation.target, observation.width, rows.size)
+    elif isinstance(scenario.preset.lidar, Lidar) and scenario.preset.lidar.dropout > 0.0:
+        read &= observation.has_map
+    return rows, columns, read
 
 
 def count_safe_cells(record: EpisodeRecord) -> tuple[int, int]:
@@ -225,8 +232,10 @@ def find_remedies(study: Study, policy: str, record: EpisodeRecord) -> tuple[str
     preset = record.scenario.preset
     rules = preset.rules
     changes: dict[str, Preset] = {}
-    if preset.lidar.noise > 0.0:
+    if isinstance(preset.lidar, Lidar) and preset.lidar.noise > 0.0:
         changes["noiseless map"] = replace(preset, lidar=replace(preset.lidar, noise=0.0))
+    if isinstance(preset.lidar, RangingLidar):
+        changes["twice the rays"] = replace(preset, lidar=replace(preset.lidar, rays=2 * preset.lidar.rays))
     if rules.thrust_error > 0.0:
         changes["exact engine"] = replace(preset, rules=replace(rules, thrust_error=0.0))
     if rules.navigation_position_error > 0.0 or rules.navigation_velocity_error > 0.0:

@@ -51,7 +51,7 @@ class Robustness(RunOptions):
     """Command line of the robustness sweep.
 
     Attributes:
-        factors: names of factors; `all` is every one.
+        factors: names of factors; `all` is every one that the preset has.
         episodes: episodes per policy and level.
         levels: levels per factor beside the preset's own value, at most.
         preset: the setting that is varied.
@@ -82,7 +82,7 @@ def plan_points(options: Robustness) -> tuple[Study, list[Point]]:
     policies, paths = choose_policies(options.policies, preset.name)
     own = Study(preset, policies, options.episodes, options.study_seed, options.split, paths)
     points = [Point(_NOMINAL, own)]
-    for factor in choose_factors(options.factors):
+    for factor in choose_factors(options.factors, preset):
         for level in factor.chosen(preset, options.levels):
             points.append(Point(_label(factor, level), replace(own, preset=factor.vary(preset, level))))
     return own, points
@@ -114,7 +114,7 @@ def run_robustness(options: Robustness) -> list[Sweep]:
     flown = fly_points(out, points, options.existing, options.workers)
     studies = {point.label: point.study for point in points}
     sweeps = []
-    for factor in choose_factors(options.factors):
+    for factor in choose_factors(options.factors, own.preset):
         value = factor.nominal(own.preset)
         varied = {level: _label(factor, level) for level in factor.chosen(own.preset, options.levels)}
         levels = dict(sorted({value: flown[_NOMINAL], **{k: flown[n] for k, n in varied.items()}}.items()))

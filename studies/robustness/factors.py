@@ -7,6 +7,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from guidance.validation import unknown_name
+from hda.sensing.lidar import Lidar
+from hda.sensing.ranging import RangingLidar
 from hda.task.presets import Preset
 from hda.task.rules import Range
 from hda.terrain.generator import TerrainParameters
@@ -23,6 +25,7 @@ class Factor:
         nominal: gives the preset's own value.
         levels: values to fly, those of most interest first: the first n make a sweep of n levels.
         vary: gives the preset with another value.
+        applies: whether a preset has this number.
     """
 
     name: str
@@ -30,6 +33,7 @@ class Factor:
     nominal: Callable[[Preset], float]
     levels: tuple[float, ...]
     vary: Callable[[Preset, float], Preset]
+    applies: Callable[[Preset], bool] = lambda preset: True
 
     def chosen(self, preset: Preset, count: int) -> tuple[float, ...]:
         """The first `count` levels that differ from the preset's own value, rising."""
@@ -42,8 +46,39 @@ def _rules(preset: Preset, **changes: float | int) -> Preset:
     return replace(preset, rules=replace(preset.rules, **changes))
 
 
-def _lidar(preset: Preset, **changes: float) -> Preset:
+def _lidar(preset: Preset, **changes: float | int) -> Preset:
     return replace(preset, lidar=replace(preset.lidar, **changes))
+
+
+def _map_lidar(preset: Preset) -> Lidar:
+    if not isinstance(preset.lidar, Lidar):
+        raise ValueError(f"preset {preset.name!r} measures ranges: it has no noise of a map to vary")
+    return preset.lidar
+
+
+def _ranging_lidar(preset: Preset) -> RangingLidar:
+    if not isinstance(preset.lidar, RangingLidar):
+        raise ValueError(f"preset {preset.name!r} measures no ranges: fly the factor on `lidar`")
+    return preset.lidar
+
+
+def _ranging_factor(
+    name: str, label: str, field: str, levels: tuple[float, ...], unit: float = 1.0
+) -> Factor:
+    """A factor that is one field of a ranging LIDAR; `unit` of the label in SI units."""
+
+    def vary(preset: Preset, value: float) -> Preset:
+        kind = type(getattr(_ranging_lidar(preset), field))
+        return _lidar(preset, **{field: kind(unit * value)})
+
+    return Factor(
+        name,
+        label,
+        lambda preset: getattr(_ranging_lidar(preset), field) / unit,
+        levels,
+        vary,
+        lambda preset: isinstance(preset.lidar, RangingLidar),
+    )
 
 
 def _interval(preset: Preset, seconds: float) -> Preset:
@@ -105,17 +140,35 @@ FACTORS: dict[str, Factor] = {
         Factor(
             "map-noise",
             "noise of the map at 500 m (1 sigma)",
-            lambda preset: preset.lidar.noise,
+            lambda preset: _map_lidar(preset).noise,
             (0.3, 0.15, 0.1, 0.0, 0.2),
             lambda preset, value: _lidar(preset, noise=value),
+            lambda preset: isinstance(preset.lidar, Lidar),
         ),
         Factor(
             "map-dropout",
             "share of the looks without a map",
-            lambda preset: preset.lidar.dropout,
+            lambda preset: _map_lidar(preset).dropout,
             (0.6, 0.4, 0.2, 0.0, 0.8),
             lambda preset, value: _lidar(preset, dropout=value),
+            lambda preset: isinstance(preset.lidar, Lidar),
         ),
+        _ranging_factor("rays", "rays along each side of a scan", "rays", (64, 32, 96, 256, 192)),
+        _ranging_factor(
+            "range-noise", "noise of a range at 500 m (1 sigma) [cm]", "range_noise", (10, 5, 0, 3, 20), 0.01
+        ),
+        _ranging_factor("range-bias", "bias of a scan (1 sigma) [m]", "range_bias", (1.0, 0.2, 0.0, 3.0)),
+        _ranging_factor(
+            "ray-dropout", "share of the rays without an echo", "ray_dropout", (0.1, 0.01, 0.03, 0.001)
+        ),
+        _ranging_factor(
+            "pointing-error",
+            "error of a scan's attitude (1 sigma) [mrad]",
+            "pointing_error",
+            (5, 2, 0, 10),
+            1e-3,
+        ),
+        _ranging_factor("scan-time", "duration of a scan [s]", "scan_duration", (5.0, 0.0, 1.0, 10.0)),
         Factor(
             "slant-limit",
             "sensor's limit off the vertical [deg]",
@@ -187,8 +240,8 @@ FACTORS: dict[str, Factor] = {
 }
 
 
-def choose_factors(wanted: Sequence[str]) -> tuple[Factor, ...]:
-    """Factors of the given names, in the table's order, each once; `all` is every one.
+def choose_factors(wanted: Sequence[str], preset: Preset) -> tuple[Factor, ...]:
+    """Factors of the given names, in the table's order, each once; `all` is every one that the preset has.
 
     Raises:
         ValueError: there is no such factor, or none was given.
@@ -198,4 +251,8 @@ def choose_factors(wanted: Sequence[str]) -> tuple[Factor, ...]:
     for name in wanted:
         if name != "all" and name not in FACTORS:
             raise ValueError(unknown_name("factor", name, ("all", *FACTORS)))
-    return tuple(factor for factor in FACTORS.values() if "all" in wanted or factor.name in wanted)
+    return tuple(
+        factor
+        for factor in FACTORS.values()
+        if factor.name in wanted or ("all" in wanted and factor.applies(preset))
+    )

@@ -39,8 +39,9 @@ pytestmark = pytest.mark.parametrize("name", names())
 
 @pytest.fixture(scope="module")
 def scenarios() -> list[Scenario]:
-    """Twenty starts, half of them on the hard ground."""
-    return [hda.sample_scenario(("paper", "hard")[k % 2], 17, k) for k in range(20)]
+    """Twenty starts, by map and by measured looks, half of them on the hard ground or with few rays."""
+    presets = ("paper", "lidar", "hard", "lidar-coarse")
+    return [hda.sample_scenario(presets[k % 4], 17, k) for k in range(20)]
 
 
 def pilot(name: str, scenario: Scenario) -> Policy[Any]:

@@ -79,7 +79,7 @@ def test_no_admissible_thrust_is_nearer(size, direction, degrees, least):
 @given(size=st.floats(0.0, 12_000.0), lean=st.floats(0.0, 1.0), azimuth=st.floats(-3.0, 3.0), degrees=LIMITS)
 def test_what_keeps_the_limits_is_left_alone(size, lean, azimuth, degrees):
     limit = math.radians(degrees)
-    angle = lean * limit
+    angle = lean * limit * (1.0 - 1e-9)  # on the limit itself rounding decides
     command = size * np.array(
         [math.sin(angle) * math.cos(azimuth), math.sin(angle) * math.sin(azimuth), math.cos(angle)]
     )

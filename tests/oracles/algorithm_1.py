@@ -102,7 +102,12 @@ def stable_planes(contacts: NDArray[np.float64]) -> list[tuple[NDArray[np.float6
 
 
 def assess_cell(
-    dem: NDArray[np.float64], column: int, row: int, pixel_size: float, limits: Limits
+    dem: NDArray[np.float64],
+    column: int,
+    row: int,
+    pixel_size: float,
+    limits: Limits,
+    noise: NDArray[np.float64] | None = None,
 ) -> tuple[float, float, float]:
     """Worst slope and roughness, least probability of the roughness limit at one cell; NaN when unknown."""
     radius, pad_radius = radii_in_cells(limits, pixel_size)
@@ -127,7 +132,8 @@ def assess_cell(
                     if math.isnan(ground[2]):
                         return math.nan, math.nan, 0.0
                     roughness = float(normal @ (ground - point))
-                    spread = limits.range_noise * math.cos(slope)
+                    own = limits.range_noise if noise is None else noise[row + y, column + x]
+                    spread = own * math.cos(slope)
                     z_score = (roughness - limits.max_roughness) / spread
                     worst_roughness = max(worst_roughness, roughness)
                     least_probability = min(
@@ -136,8 +142,10 @@ def assess_cell(
     return worst_slope, worst_roughness, least_probability
 
 
-def assess(dem: NDArray[np.float64], pixel_size: float, limits: Limits) -> OracleMap:
-    """Algorithm 1 at every cell."""
+def assess(
+    dem: NDArray[np.float64], pixel_size: float, limits: Limits, noise: NDArray[np.float64] | None = None
+) -> OracleMap:
+    """Algorithm 1 at every cell; `noise` [m] is each height's own error in place of the common one."""
     rows, columns = dem.shape
     reach = sum(radii_in_cells(limits, pixel_size))
     result = OracleMap(
@@ -148,7 +156,7 @@ def assess(dem: NDArray[np.float64], pixel_size: float, limits: Limits) -> Oracl
     )
     for row in range(reach, rows - reach):
         for column in range(reach, columns - reach):
-            slope, roughness, probability = assess_cell(dem, column, row, pixel_size, limits)
+            slope, roughness, probability = assess_cell(dem, column, row, pixel_size, limits, noise)
             result.slope[row, column] = slope
             result.roughness[row, column] = roughness
             if slope <= limits.max_slope:

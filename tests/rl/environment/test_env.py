@@ -16,7 +16,9 @@ import rl  # noqa: F401 - registers the environments
 from hda.flight.episode import advance, begin_flight, fly, observe
 from hda.flight.outcome import score_step
 from hda.flight.record import EpisodeRecord
-from hda.task.presets import PRESETS
+from hda.sensing.lidar import Lidar
+from hda.sensing.ranging import RangingLidar
+from hda.task.presets import PRESETS, Preset
 from hda.task.scenario import sample_scenario
 from rl.environment.action import decide_action
 from rl.environment.dispersions import Dispersions
@@ -39,6 +41,11 @@ class ScriptedPolicy:
 
     def decide(self, observation, memory):
         return decide_action(self.actions[memory], observation), memory + 1
+
+
+def map_lidar(preset: Preset) -> Lidar:
+    assert isinstance(preset.lidar, Lidar)
+    return preset.lidar
 
 
 def flatten(observation: Any) -> np.ndarray:
@@ -254,7 +261,7 @@ def starts(name: str, **options: float) -> np.ndarray:
                 "descent_speed": -state.velocity[2],
                 "horizontal_speed": math.hypot(state.velocity[0], state.velocity[1]),
                 "approach_spread": math.remainder(heading, 2 * math.pi),
-                "map_noise": env.scenario.preset.lidar.noise,
+                "map_noise": map_lidar(env.scenario.preset).noise,
                 "thrust_error": env.scenario.streams.thrust_error(0, env.scenario.preset.rules.thrust_error),
             }[name]
         )
@@ -306,7 +313,15 @@ def test_dropped_maps_have_a_switch():
     assert 0 < sum(maps(1.0)) < 12  # all alike in 12 looks: once in 460 seeds at most
     assert all(maps(0.0))
     assert not any(maps(2.5))
-    assert Dispersions(map_dropout=100.0).applied(PRESETS["partial"]).lidar.dropout == 1.0
+    assert map_lidar(Dispersions(map_dropout=100.0).applied(PRESETS["partial"])).dropout == 1.0
+
+
+def test_on_measured_looks_the_same_factors_scale_the_ranges():
+    preset = replace(PRESETS["lidar"], lidar=RangingLidar(ray_dropout=0.1))
+    lidar = Dispersions(map_noise=3.0, map_dropout=2.0).applied(preset).lidar
+    assert lidar == RangingLidar(ray_dropout=0.2, range_noise=3.0 * RangingLidar().range_noise)
+    full = Dispersions(map_dropout=100.0).applied(preset).lidar
+    assert full == RangingLidar(ray_dropout=1.0)
 
 
 def test_without_dispersions_the_flight_to_the_first_target_is_repeatable_and_clean():

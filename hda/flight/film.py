@@ -1,0 +1,175 @@
+"""A flight as an animated GIF: the ground, the look of the moment, the height, frame by frame.
+
+python -m hda.flight.film --policy hazard-aware --preset hard --episode 17 --out flight.gif
+"""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import numpy as np
+import tyro
+
+from guidance.arrays import Array
+from guidance.console import tolerate_encoding
+from hda.flight.episode import fly
+from hda.flight.moment import SIZE, draw_moment, find_moment
+from hda.flight.outcome import ENDINGS
+from hda.flight.palette import COLORS
+from hda.flight.record import EpisodeRecord
+from hda.task.scenario import sample_scenario
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
+
+_GREYS = 96  # of the palette that all frames share; the colours of lines, and their blends, are the rest
+_BLENDS = 9
+_LAST_FRAME = 2500  # [ms] that the landing stays
+
+
+@dataclass(frozen=True)
+class FilmOptions:
+    """How a flight is filmed.
+
+    Attributes:
+        step: [s] of flight between two frames.
+        speed: seconds of flight that a second of the film shows.
+        width: [pixel] of the film; its height is in proportion.
+    """
+
+    step: float = 0.5
+    speed: float = 5.0
+    width: int = 800
+
+    def __post_init__(self) -> None:
+        """Check every field.
+
+        Raises:
+            ValueError: a field is out of range.
+        """
+        if not self.step > 0.0:
+            raise ValueError(f"step must be positive, got {self.step}")
+        if not self.speed > 0.0:
+            raise ValueError(f"speed must be positive, got {self.speed}")
+        if not 200 <= self.width <= 3000:
+            raise ValueError(f"width must lie between 200 and 3000 pixels, got {self.width}")
+
+
+def film_frames(record: EpisodeRecord, options: FilmOptions) -> Iterator[Image]:
+    """Frames of the film of a flight, from its start to its touchdown, as RGB images."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from PIL import Image
+
+    for time in frame_times(record, options):
+        figure = draw_moment(find_moment(record, time))
+        figure.set_dpi(options.width / SIZE[0])
+        canvas = FigureCanvasAgg(figure)
+        canvas.draw()
+        yield Image.fromarray(np.asarray(canvas.buffer_rgba())[..., :3].copy())
+
+
+def frame_times(record: EpisodeRecord, options: FilmOptions) -> Array:
+    """[s] time of flight that each frame shows; the last is the touchdown."""
+    end = float(record.time[-1])
+    return np.append(np.arange(float(record.time[0]), end, options.step), end)
+
+
+def save_frames(path: Path, frames: Sequence[Image], options: FilmOptions) -> None:
+    """Write frames as a GIF that repeats for ever; the last stays for a while.
+
+    Args:
+        path: of the GIF; its folder is made.
+        frames: RGB images of one size.
+        options: how the flight was filmed.
+
+    Raises:
+        ValueError: `path` does not end in .gif.
+    """
+    from PIL.Image import Dither
+
+    _check_name(path)
+    palette = _make_palette()  # one for all, so that what stands still is not written again
+    drawn = [frame.quantize(palette=palette, dither=Dither.NONE) for frame in frames]
+    times = [max(round(1000.0 * options.step / options.speed), 20)] * (len(drawn) - 1) + [_LAST_FRAME]
+    path.parent.mkdir(parents=True, exist_ok=True)
+    drawn[0].save(path, save_all=True, append_images=drawn[1:], duration=times, loop=0)
+
+
+def _make_palette() -> Image:
+    """Greys, and the colours of lines as they blend into white paper and into dark ground."""
+    from matplotlib.colors import to_rgb
+    from PIL import Image
+
+    greys = np.repeat(np.linspace(0.0, 1.0, _GREYS)[:, None], 3, axis=1)
+    share = np.linspace(1.0, 0.2, _BLENDS)[:, None]
+    blends = [
+        share * np.array(to_rgb(color)) + (1.0 - share) * ground
+        for color in (COLORS[1], COLORS[4], COLORS[5])
+        for ground in (1.0, 0.33, 0.0)
+    ]
+    entries = np.round(255.0 * np.concatenate([greys, *blends])).astype(int)
+    palette = Image.new("P", (1, 1))
+    palette.putpalette(entries.ravel().tolist())
+    return palette
+
+
+def _check_name(path: Path) -> None:
+    if path.suffix.lower() != ".gif":
+        raise ValueError(f"out must end in .gif, got {str(path)!r}")
+
+
+def film_flight(
+    policy: str = "hazard-aware",
+    preset: str = "paper",
+    episode: int = 17,
+    study_seed: int = 0,
+    split: str = "validation",
+    out: Annotated[Path, tyro.conf.arg(metavar="FILE")] = Path("flight.gif"),
+    film: Annotated[FilmOptions, tyro.conf.arg(name="")] = FilmOptions(),
+) -> None:
+    """Fly one episode and film it.
+
+    Args:
+        policy: name of a policy or an agent, or package.module:Name of your own.
+        preset: setting.
+        episode: number of the episode.
+        study_seed: seed of the study that the episode is from.
+        split: tiles: train, tuning, validation or fresh.
+        out: GIF to write.
+        film: how it is filmed.
+    """
+    from rich.progress import track
+
+    from hda.registry import AGENTS, make_policy
+
+    if policy in AGENTS:
+        importlib.import_module("rl")  # as an entry point would: it registers the agents
+    _check_name(out)
+    sys.stdout.write(
+        f"flying {policy} on {preset}, episode {episode} (the first flight on a machine compiles)\n"
+    )
+    sys.stdout.flush()
+    record = fly(make_policy(policy), sample_scenario(preset, study_seed, episode, split))
+    times = frame_times(record, film)
+    frames = list(track(film_frames(record, film), description="drawing", total=len(times)))
+    save_frames(out, frames, film)
+    ended = f"{policy} {ENDINGS[record.outcome.ending]}"
+    sys.stdout.write(f"{ended}; wrote {out}, {len(frames)} frames, {out.stat().st_size / 1e6:.2f} MB\n")
+
+
+def main() -> None:
+    """Run the command."""
+    tolerate_encoding()
+    try:
+        tyro.cli(film_flight, prog="python -m hda.flight.film", description=__doc__)
+    except ValueError as error:
+        raise SystemExit(f"error: {error}") from None
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,142 @@
+"""What all measured looks so far say of the ground, cell by cell.
+
+The scans are fused on one elevation map for each size of cells, and each map is assessed by Algorithm 1. A
+cell of the belief keeps the reading of the finest map that knows it; how often ground is safe that reads so
+was counted on training tiles (`measured_readings`). A second look from the same height sharpens the map, one
+from below replaces its reading.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from guidance.arrays import Array
+from hda.policies.belief import LEVEL_SHARES, LEVELS, CellSquare
+from hda.policies.measured_readings import DENSITY_EDGES, HOLE, PROBABILITY_EDGES, safe_shares
+from hda.safety.criteria import SafetyCriteria
+from hda.sensing.fusion import fuse_elevations
+from hda.sensing.gridding import PIXEL_SIZES, ElevationMap
+from hda.sensing.measured_look import MeasuredGround, assess_elevation
+
+_UNREAD = -1
+_SCANNED = 0.8  # share of the cells around a site with points, for a hole to be one
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredBelief:
+    """The belief over a square of 1 m cells.
+
+    Attributes:
+        square: where it lies.
+        size_class: shape (n, n), number in `PIXEL_SIZES` of the map that each cell's reading is from; -1
+            where there is none.
+        density_class: shape (n, n), class of the points in a cell of that map.
+        probability_class: shape (n, n), class of the reading.
+        elevations: the fused map of each size of cells that was seen.
+    """
+
+    square: CellSquare
+    size_class: NDArray[np.int8] = field(repr=False)
+    density_class: NDArray[np.int8] = field(repr=False)
+    probability_class: NDArray[np.int8] = field(repr=False)
+    elevations: dict[float, ElevationMap] = field(default_factory=dict, repr=False)
+
+    @classmethod
+    def blank(cls, center: Array, half_side: int) -> MeasuredBelief:
+        """Nothing seen yet, over the cells within `half_side` [m] of `center` along each axis."""
+        square = CellSquare.around(center, half_side)
+        sizes, densities, readings = np.full((3, square.side, square.side), _UNREAD, dtype=np.int8)
+        return cls(square, sizes, densities, readings)
+
+    @property
+    def corner(self) -> tuple[int, int]:
+        """(x, y) of the square's south-west corner [m]."""
+        return self.square.corner
+
+    @property
+    def side(self) -> int:
+        """Cells along each side."""
+        return self.square.side
+
+    @property
+    def seen(self) -> NDArray[np.bool_]:
+        """Shape (n, n), whether a cell has a reading."""
+        return self.size_class != _UNREAD
+
+    def fused(
+        self, ground: MeasuredGround, criteria: SafetyCriteria, percentile: float | None
+    ) -> MeasuredBelief:
+        """The belief after one more look.
+
+        Args:
+            ground: what was measured.
+            criteria: of the lander.
+            percentile: by which heights are gridded.
+        """
+        if 0 in ground.grid.shape:
+            return self
+        size = ground.grid.pixel_size
+        before = self.elevations.get(size)
+        if before is not None:
+            ground = assess_elevation(fuse_elevations(before, ground.elevation, percentile), criteria)
+        number = PIXEL_SIZES.index(size)
+        reading, density = classify_readings(ground, criteria)
+        axis = np.arange(self.side, dtype=np.float64) + 0.5
+        rows = ground.grid.rows_of(self.corner[1] + axis)
+        columns = ground.grid.columns_of(self.corner[0] + axis)
+        i, j = _inside(rows, ground.grid.rows), _inside(columns, ground.grid.columns)
+        there, here = np.ix_(rows[i], columns[j]), np.ix_(i, j)
+        old = self.size_class[here]
+        better = (reading[there] != _UNREAD) & ((old == _UNREAD) | (number <= old))
+        better &= (reading[there] != HOLE) | (old == _UNREAD) | (number == old)
+        sizes, densities, readings = (
+            layer.copy() for layer in (self.size_class, self.density_class, self.probability_class)
+        )
+        sizes[here] = np.where(better, np.int8(number), old)
+        densities[here] = np.where(better, density[there], densities[here])
+        readings[here] = np.where(better, reading[there], readings[here])
+        elevations = self.elevations | {size: ground.elevation}
+        return MeasuredBelief(self.square, sizes, densities, readings, elevations)
+
+    def probability(self) -> NDArray[np.float32]:
+        """Shape (n, n), share of safe ground among cells that read as each does; the prior where unread."""
+        prior = float(LEVEL_SHARES[LEVELS.size // 2 :].sum() / LEVEL_SHARES.sum())
+        share = safe_shares()[self.size_class, self.density_class, self.probability_class]
+        return np.where(self.seen, share, np.float32(prior))
+
+    def cell(self, site: Array) -> tuple[int, int] | None:
+        """(row, column) of the cell under `site`, or None outside the square."""
+        return self.square.cell(site)
+
+    def site(self, row: int, column: int, plane: float) -> Array:
+        """[m] shape (3,), centre of a cell at the height of the target plane."""
+        return self.square.site(row, column, plane)
+
+
+def _inside(places: NDArray[np.int64], count: int) -> NDArray[np.int64]:
+    """Indices of the places that lie in [0, count)."""
+    return np.flatnonzero((places >= 0) & (places < count))
+
+
+def classify_readings(
+    ground: MeasuredGround, criteria: SafetyCriteria
+) -> tuple[NDArray[np.int8], NDArray[np.int8]]:
+    """Class of V_P and of the density of points of every cell; -1 where its ground was not scanned."""
+    from scipy.ndimage import uniform_filter
+
+    count = ground.elevation.count
+    span = 2 * round(0.5 * criteria.footprint_diameter / ground.grid.pixel_size) + 1
+    scanned = uniform_filter((count > 0).astype(np.float32), span, mode="constant")
+    points = uniform_filter(count.astype(np.float32), span, mode="constant")
+    density = np.searchsorted(DENSITY_EDGES, points / np.maximum(scanned, 1e-6)).astype(np.int8)
+    reading = np.searchsorted(PROBABILITY_EDGES, ground.probability).astype(np.int8)
+    edge = span // 2
+    holed = np.zeros(reading.shape, dtype=np.bool_)
+    holed[edge : reading.shape[0] - edge, edge : reading.shape[1] - edge] = True
+    holed &= (scanned >= _SCANNED) & ~ground.known
+    reading[~ground.known] = _UNREAD
+    reading[holed] = HOLE
+    return reading, density
