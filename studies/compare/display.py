@@ -6,7 +6,7 @@ most ten of them for a phase.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from time import monotonic
@@ -18,6 +18,7 @@ from rich.text import Text
 
 _LINES = 10  # at most, of a phase, where the output is no terminal
 _PAUSE = 2.0  # [s] at least, between two of them
+_REDRAW = 1.0  # [s] at least, between two tables on a terminal
 
 
 @dataclass
@@ -92,23 +93,32 @@ class Display:
             about = "" if self.phase.expected is None else f" (about {self.phase.expected:.0f} s)"
             self.print(f"{self.phase.title}{about}")
 
-    def advance(self, steps: int, below: RenderableType = "", note: str = "") -> None:
+    def advance(
+        self,
+        steps: int,
+        below: Callable[[], RenderableType] | None = None,
+        note: Callable[[], str] | None = None,
+    ) -> None:
         """Show that steps are done.
 
         Args:
             steps: how many more.
-            below: for a terminal, in place of what stood below the bar.
-            note: for plain output, behind the numbers.
+            below: makes what a terminal shows below the bar; called once a second at most.
+            note: makes what plain output says behind the numbers; called for a line that is printed.
         """
-        self.phase.completed += steps
-        self._below = below
-        self._progress.update(self._task, completed=self.phase.completed)
-        due = self.phase.completed * _LINES // max(self.phase.total, 1)
-        waited = monotonic() - self._told_at >= _PAUSE or self.phase.completed == self.phase.total
-        if not self.console.is_terminal and due > self._told and waited:
-            self._told, self._told_at = due, monotonic()
-            counted = f"{self.phase.completed}/{self.phase.total}, {self.phase.describe_time()}"
-            self.print(f"{self.phase.title}: {counted}{note and '; '}{note}")
+        phase, now = self.phase, monotonic()
+        phase.completed += steps
+        last = phase.completed == phase.total
+        if self.console.is_terminal:
+            self._progress.update(self._task, completed=phase.completed)
+            if below is not None and (last or now - self._told_at >= _REDRAW):
+                self._below, self._told_at = below(), now
+            return
+        due = phase.completed * _LINES // max(phase.total, 1)
+        if due > self._told and (last or now - self._told_at >= _PAUSE):
+            self._told, self._told_at = due, now
+            said = f"{phase.title}: {phase.completed}/{phase.total}, {phase.describe_time()}"
+            self.print(said if note is None else f"{said}; {note()}")
 
     def print(self, line: str) -> None:
         """Print a line that stays."""

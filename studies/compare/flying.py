@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 
@@ -19,10 +20,11 @@ from hda.registry import policy_entry
 from studies.campaign.executor import OpenExecutor
 from studies.campaign.monte_carlo import Chunk, Study, fly_chunk, prepare_study
 from studies.campaign.points import describe_retry, find_missing, fly_missing
-from studies.campaign.score import MEASURE_COLUMNS, RATIO_COLUMNS, RunningScore, Score
+from studies.campaign.score import MEASURE_COLUMNS, RATIO_COLUMNS, RunningScore
 from studies.campaign.study_folder import StudyFolder
 from studies.columns import document_cell
 from studies.compare.display import Phase, show_phase
+from studies.statistics.ratios import wilson_interval
 
 COMPILING_SECONDS = 40.0
 """[s] about what compiling takes, once for a version of the code; for the display alone."""
@@ -64,14 +66,16 @@ def fly_comparison(folder: StudyFolder, open_executor: OpenExecutor, here: bool,
     with show_phase(
         console, Phase("episodes", study.episodes, expected, completed=kept, kept=kept)
     ) as display:
+        wilson_interval(0, 1)  # loads scipy.stats, 1 s: not later, while workers wait for their next chunks
         scores = {name: RunningScore() for name in study.policies}
 
         def tell(chunk: Chunk) -> None:
             for name, rows in chunk.rows.items():
                 for row in rows:
                     scores[name].add(row)
-            so_far = {name: running.collect() for name, running in scores.items()}
-            display.advance(chunk.last - chunk.first, _table_so_far(so_far), _ratios_so_far(so_far))
+            display.advance(
+                chunk.last - chunk.first, partial(_table_so_far, scores), partial(_ratios_so_far, scores)
+            )
             if words := describe_retry(chunk):
                 display.print(words)
 
@@ -125,19 +129,21 @@ def _read_flown() -> set[str]:
         return set()
 
 
-def _table_so_far(scores: dict[str, Score]) -> Table:
+def _table_so_far(running: dict[str, RunningScore]) -> Table:
     """A line for each policy, over the episodes that this run has flown."""
-    flown = next(iter(scores.values())).episodes
+    flown = next(iter(running.values())).episodes
     table = Table(title=f"after {flown} episodes (95 % intervals)", title_justify="left")
     table.add_column("policy", no_wrap=True)
     for column in _COLUMNS:
         table.add_column(column.title, justify="right", no_wrap=True)
-    for name, score in scores.items():
+    for name, one in running.items():
+        score = one.collect()
         table.add_row(name, *(document_cell(column, score) for column in _COLUMNS))
     return table
 
 
-def _ratios_so_far(scores: dict[str, Score]) -> str:
+def _ratios_so_far(running: dict[str, RunningScore]) -> str:
     """The same in a line, shorter."""
     ratio = _COLUMNS[0]
-    return f"{ratio.title}: " + ", ".join(f"{name} {ratio.text(score)}" for name, score in scores.items())
+    cells = (f"{name} {ratio.text(one.collect())}" for name, one in running.items())
+    return f"{ratio.title}: {', '.join(cells)}"

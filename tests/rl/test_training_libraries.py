@@ -76,8 +76,11 @@ def test_training_names_the_extra_in_one_line(words: tuple[str, ...]) -> None:
     assert not (ROOT / "never").exists()
 
 
-def test_the_speed_of_training_names_it_too() -> None:
-    done = run_command("rl.training_speed", "--rounds", "1")
+@pytest.mark.parametrize(
+    ("module", "words"), [("rl.training_speed", ()), ("rl.figures", ("reconstruction", "--out", "never.png"))]
+)
+def test_what_else_needs_them_names_it_too(module: str, words: tuple[str, ...]) -> None:
+    done = run_command(module, *words)
     assert done.returncode == 1
     assert "lunar-hda[train]" in done.stderr
     assert "Traceback" not in done.stderr

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from rl.training_libraries import TrainingLibrariesError
 from studies.bench import Bench, bench
 from studies.columns import Column
 from studies.speed_ratios import COLUMNS, SpeedRatio, measure_ratios
@@ -47,3 +48,18 @@ def test_the_bench_leaves_its_tables(tmp_path: Path) -> None:
     assert all(0.0 < float(row["median_ms"]) <= float(row["high_ms"]) for row in times)
     assert [float(row["ratio"]) for row in kept] == pytest.approx([ratio.ratio for ratio in ratios])
     assert json.loads((tmp_path / "provenance.json").read_text())["options"]["episodes"] == 3
+
+
+@pytest.mark.slow
+def test_without_the_libraries_of_training_its_ratio_is_left_out_and_that_is_said(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def refuse() -> None:
+        raise TrainingLibrariesError("training needs torch")
+
+    for module in ("studies.speed_ratios", "studies.bench"):
+        monkeypatch.setattr(f"{module}.require_training_libraries", refuse)
+    _, ratios = bench(Bench(episodes=1, repeats=1, out=tmp_path))
+    assert "encoding a look" in [ratio.work for ratio in ratios]
+    assert "an update" not in [ratio.work for ratio in ratios]
+    assert "an update of training is not measured: training needs torch" in capsys.readouterr().out

@@ -42,6 +42,7 @@ ALLOWED: dict[tuple[str, str], str] = {
     ("guidance/exports.py", "importlib.import_module"): "modules of these packages, by fixed names",
     ("hda/registry.py", "importlib.import_module"): "the policy that the user names: package.module:Name",
     ("hda/registry.py", ".load() of an entry point"): "policies of installed packages",
+    ("studies/launcher.py", "importlib.import_module"): "commands of these packages, by fixed names",
     ("studies/timing/gfold_peer.py", "importlib.import_module"): "an optional peer, by a fixed name",
     ("studies/timing/openscvx_worker.py", "importlib.import_module"): "an optional peer, by a fixed name",
     ("studies/timing/qoco_peer.py", "importlib.import_module"): "an optional peer, by a fixed name",
