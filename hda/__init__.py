@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from hda.safety.criteria import SafetyCriteria
     from hda.safety.safety_map import SafetyMap, assess_safety
     from hda.sensing.lidar import Lidar
+    from hda.sensing.ranging import RangingLidar
     from hda.task.observation import Observation, ScenarioView
     from hda.task.own_ground import place_preset
     from hda.task.presets import PRESETS, Preset
@@ -40,6 +41,7 @@ _HOMES = {
     "hda.safety.criteria": ("SafetyCriteria",),
     "hda.safety.safety_map": ("SafetyMap", "assess_safety"),
     "hda.sensing.lidar": ("Lidar",),
+    "hda.sensing.ranging": ("RangingLidar",),
     "hda.task.observation": ("Observation", "ScenarioView"),
     "hda.task.own_ground": ("place_preset",),
     "hda.task.presets": ("PRESETS", "Preset"),
@@ -63,6 +65,7 @@ __all__ = [
     "PolicyEntry",
     "Preset",
     "PrivilegedPolicy",
+    "RangingLidar",
     "Rules",
     "SafetyCriteria",
     "SafetyMap",
