@@ -191,6 +191,8 @@ def _known_sites(hole: NDArray[np.bool_], footprint: LanderFootprint) -> NDArray
     edge = footprint.half_size
     known[edge : hole.shape[0] - edge, edge : hole.shape[1] - edge] = True
     rows, columns = np.nonzero(hole)
+    if rows.size == 0:
+        return known
     for north, east in footprint.support:
         row, column = rows - north, columns - east
         inside = (row >= 0) & (row < hole.shape[0]) & (column >= 0) & (column < hole.shape[1])

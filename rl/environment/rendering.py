@@ -8,12 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hda.flight.episode import Step
+from hda.flight.look_picture import draw_elevation
 from hda.flight.palette import COLORS
 from hda.flight.picture import draw_field_of_view, draw_true_safety
 from hda.task.observation import Observation
 from hda.task.scenario import Scenario
 
-_SIZE = (10.0, 5.0)
+_SIDE = 5.0  # [inch] of a panel
 _DPI = 64
 _HALF_SIDE = 270.0  # [m] of the ground around the first target: every start of the paper's lies in it
 
@@ -27,16 +28,19 @@ def render_flight(scenario: Scenario, steps: Sequence[Step], observation: Observ
         observation: the present look.
 
     Returns:
-        RGB picture, shape (320, 640, 3): the ground around the path on the left, the look on the right.
+        RGB picture, shape (320, 640, 3): the ground around the path on the left, the look on the right; of a
+        ranging LIDAR, shape (320, 960, 3), with the heights that it measured beside.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     start = scenario.initial_state.position[None]
     path = np.concatenate([start, *(step.segment.path[1:, :3] for step in steps)])
-    figure = Figure(_SIZE, dpi=_DPI, layout="constrained")
+    panels = 2 if observation.ground is None else 3
+    figure = Figure((panels * _SIDE, _SIDE), dpi=_DPI, layout="constrained")
     canvas = FigureCanvasAgg(figure)
-    ground, seen = figure.subplots(1, 2)
+    axes = figure.subplots(1, panels)
+    ground, seen = axes[:2]
     draw_true_safety(ground, scenario.tile)
     draw_field_of_view(ground, observation)
     ground.plot(path[:, 0], path[:, 1], color=COLORS[1])
@@ -52,5 +56,8 @@ def render_flight(scenario: Scenario, steps: Sequence[Step], observation: Observ
     )
     seen.plot(0, 0, "+", color=COLORS[0], markersize=10)
     seen.set_title("look: observed safety about the target [m]")
+    if observation.ground is not None:
+        draw_elevation(axes[2], observation)
+        axes[2].set_title("measured heights; orange: holes")
     canvas.draw()
     return np.asarray(canvas.buffer_rgba())[:, :, :3].copy()

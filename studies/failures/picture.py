@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hda.flight.episode import ground_point
+from hda.flight.look_picture import draw_elevation, draw_verdict
 from hda.flight.palette import COLORS
 from hda.flight.picture import draw_ground_track
 from hda.flight.record import EpisodeRecord
@@ -22,17 +23,25 @@ _NEAR = 15.0  # [m] around the touchdown that is shown
 
 
 def draw_failure(record: EpisodeRecord, words: str) -> Figure:
-    """Draw the ground track, speed and height, the ground at the touchdown, and the last looks."""
+    """Draw the ground track, speed and height, the ground at the touchdown, and the last looks.
+
+    Where the sensor measures heights, they stand below the looks.
+    """
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(13.5, 8.0), layout="constrained")
-    grid = figure.add_gridspec(2, 12, height_ratios=(1.35, 1.0))
+    measured = record.observations[0].ground is not None
+    figure = Figure(figsize=(13.5, 8.0 + 3.4 * measured), layout="constrained")
+    grid = figure.add_gridspec(2 + measured, 12, height_ratios=(1.35, 1.0, 1.0)[: 2 + measured])
     draw_ground_track(figure.add_subplot(grid[0, :5]), record)
     _draw_descent(figure.add_subplot(grid[0, 5:8]), record)
     _draw_touchdown(figure.add_subplot(grid[0, 8:]), record)
     looks = record.observations[-_LOOKS:]
     for k, observation in enumerate(looks):
         _draw_look(figure.add_subplot(grid[1, 3 * k : 3 * k + 3]), record, observation)
+        if measured:
+            heights = figure.add_subplot(grid[2, 3 * k : 3 * k + 3])
+            draw_elevation(heights, observation)
+            heights.set_title("its measured heights; orange: holes", fontsize="small")
     episode = f"{record.policy}, {record.scenario.preset.name}, episode {record.scenario.streams.episode}: "
     figure.suptitle("\n".join(textwrap.wrap(episode + words, 150)), fontsize="medium")
     return figure
@@ -70,25 +79,12 @@ def _draw_touchdown(axis: Axes, record: EpisodeRecord) -> None:
 
 
 def _draw_look(axis: Axes, record: EpisodeRecord, observation: Observation) -> None:
-    half = 0.5 * observation.width
-    x, y = (float(value) for value in observation.target[:2])
-    axis.imshow(
-        observation.safety_map,
-        origin="lower",
-        extent=(x - half, x + half, y - half, y + half),
-        cmap="gray",
-        vmin=-0.6,
-        vmax=1.2,
-    )
+    draw_verdict(axis, observation)
     site = record.decisions[observation.index].site
     last = record.decisions[-1].site
     axis.plot(*last[:2], "o", color=COLORS[3], fillstyle="none", markersize=9, label="last site")
     axis.plot(*site[:2], "+", color=COLORS[0], markersize=11, markeredgewidth=1.8, label="chosen here")
-    axis.set_xlim(x - half, x + half)
-    axis.set_ylim(y - half, y + half)
     before_end = float(record.time[-1]) - observation.time
     axis.set_title(f"look {observation.index}, {before_end:.1f} s before the end", fontsize="small")
-    axis.tick_params(labelsize="x-small")
-    axis.ticklabel_format(useOffset=False)
     if observation.index == record.observations[-1].index:
         axis.legend(loc="upper left", fontsize="x-small", framealpha=0.9)

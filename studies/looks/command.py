@@ -6,7 +6,8 @@ the whole map. Precision is the share of what is called safe that is, recall the
 called so. Coarse posts step over rocks: from high up much that looks safe is not.
 
 What the belief makes of the looks of a whole flight is held against the truth too: the calibration is the
-share of safe ground among the cells of which it tells one probability.
+share of safe ground among the cells of which it tells one probability. flight.png shows one flight of
+`hazard-aware` look by look: measured heights, verdict, truth.
 """
 
 from __future__ import annotations
@@ -23,8 +24,11 @@ from rich.progress import track
 
 from guidance.console import tolerate_encoding
 from guidance.validation import finite_number
+from hda.flight.episode import fly
 from hda.ground.library import Ground, prepare_tiles, tile_numbers
+from hda.registry import make_policy
 from hda.task.presets import Preset, find_preset
+from hda.task.scenario import sample_scenario
 from studies.campaign.command_line import open_folder, resumable
 from studies.campaign.journal import Journal, open_journal
 from studies.campaign.provenance import describe_run, identify_run, write_provenance
@@ -40,6 +44,7 @@ from studies.looks.calibration import (
 from studies.looks.counts import LookSeries, PixelCounts, count_pixels, sensor_of
 from studies.looks.table import COLUMNS, LookRow, score_looks
 
+_SHOWN = "hazard-aware"
 _PRODUCTS = (
     "table.csv",
     "table.md",
@@ -47,6 +52,7 @@ _PRODUCTS = (
     "calibration.csv",
     "calibration.md",
     "calibration.png",
+    "flight.png",
     "provenance.json",
 )
 
@@ -163,8 +169,11 @@ def study_looks(options: Looks) -> tuple[list[LookRow], list[CalibrationRow]]:
         write_csv(out / "calibration.csv", CALIBRATION_COLUMNS, beliefs)
         write_markdown(out / "calibration.md", CALIBRATION_COLUMNS, beliefs)
         if options.figures:
+            from hda.flight.look_picture import draw_looks as draw_flown_looks
             from studies.looks.picture import draw_calibration, draw_looks
 
+            flown = fly(make_policy(_SHOWN), sample_scenario(preset, options.study_seed, 0, "tuning"))
+            draw_flown_looks(flown).savefig(out / "flight.png", dpi=85)
             draw_looks(rows).savefig(out / "looks.png", dpi=110)
             draw_calibration(beliefs).savefig(out / "calibration.png", dpi=110)
         write_provenance(out / "provenance.json", {**describe_run(options), "work": journal.describe()})

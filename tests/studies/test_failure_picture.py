@@ -60,6 +60,18 @@ def test_the_ground_at_the_touchdown_shows_where_the_site_really_lay(
     assert list(axes[2].get_images()[0].get_extent()) == [0, truth.shape[1], 0, truth.shape[0]]
 
 
+def test_measured_heights_stand_below_the_looks() -> None:
+    record = fly(make_policy("nearest-safe"), sample_scenario("lidar", 1, 0))
+    axes: list[Any] = draw_failure(record, "It fell.").axes
+    assert len(axes) == 11
+    for look, heights, observation in zip(axes[3::2], axes[4::2], record.observations[-4:], strict=True):
+        shown, drawn = (np.ma.asarray(axis.get_images()[0].get_array()) for axis in (look, heights))
+        assert np.array_equal(shown, observation.safety_map)
+        assert observation.elevation is not None
+        assert np.array_equal(np.ma.getmaskarray(drawn), np.isnan(observation.elevation))
+        assert heights.get_xlim() == pytest.approx(look.get_xlim())
+
+
 def test_the_last_four_looks_are_shown_with_what_was_chosen(record: EpisodeRecord, axes: list[Any]) -> None:
     assert len(axes) == 7
     for panel, observation in zip(axes[3:], record.observations[-4:], strict=True):

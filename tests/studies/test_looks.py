@@ -102,6 +102,7 @@ def test_the_study_writes_its_folder_goes_on_and_refuses_another(tmp_path):
         [100.0 * row.recall.estimate for row in rows], abs=1e-6
     )
     assert (tmp_path / "looks" / "looks.png").stat().st_size > 10_000
+    assert (tmp_path / "looks" / "flight.png").stat().st_size > 50_000
     assert (tmp_path / "looks" / "calibration.png").stat().st_size > 10_000
     assert {row.rays for row in beliefs} == {32, 64}
     before = (tmp_path / "looks" / "journal" / "items.jsonl").read_bytes()

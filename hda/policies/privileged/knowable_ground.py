@@ -15,6 +15,9 @@ looks before it lands can do better than its best truly safe cell. It is an oute
    |(p - r)/t_1 - v - g t_1/2| + |(s - p)/t_2 - (p - r)/t_1 - g T/2| + |(s - p)/t_2 + g t_2/2| <= D + w_s
    must hold for some look and some p in the cone above s. It is convex in p.
 
+Sight is that of a look at the target plane. A ranging LIDAR sees the ground below it, and so some metres
+past the square and the cone: on presets that measure ranges fact 2, and what follows from it, is no bound.
+
 Not ruled out is luck: a policy may land, unseeing, on safe ground outside the set within reach, or crash on
 it. The times of flight and p are searched on a grid refined by golden sections, with `_ALLOWANCE` to spare.
 """

@@ -359,6 +359,17 @@ def test_bad_constructor_arguments_are_named():
         LunarHDAEnv("papr")
 
 
+def test_a_picture_of_measured_looks_shows_the_heights_too():
+    env = LunarHDAMapEnv("lidar-coarse", render_mode="rgb_array")
+    env.reset(seed=0)
+    picture = env.render()
+    assert picture is not None
+    assert picture.shape == (320, 960, 3)
+    heights = picture[:, 640:].reshape(-1, 3).astype(int)
+    colourful = np.ptp(heights, axis=1) > 40  # cividis runs from blue to yellow
+    assert colourful.mean() > 0.3
+
+
 def test_picture_of_the_flight():
     env = LunarHDAMapEnv(render_mode="rgb_array")
     env.reset(seed=0)
