@@ -7,6 +7,7 @@ test of safe landings against single-divert. Privileged policies see the true ma
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -56,7 +57,7 @@ class Comparison(KeepingOptions):
         policies: names of policies; `default` is every one that is not slow and not made for another
             preset, `all` is every one; `package.module:Name` is a policy of your own, checked
             against the contract first.
-        preset: the setting: paper, hard or partial.
+        preset: the setting: paper, hard, partial, lidar or lidar-coarse.
         study_seed: seed of the study; equal seeds give equal episodes.csv and table.csv.
         split: tile split: validation or fresh to evaluate, tuning for choices.
         terrain: ground of your own in place of the preset's, GeoTIFF or .npy (1 m a cell, row 0 south); the
@@ -75,8 +76,9 @@ class Comparison(KeepingOptions):
         resume: go on with the study in the folder, which must be the same; begins it where there is none.
         figures: draw the histograms and trajectories.
         report: write report.html, and keep the flights that it shows.
-        quick: a first result: 100 episodes of six policies, in results/quick, without figures; the report
-            is opened where there is a screen. What you ask for besides stays, such as --episodes.
+        quick: a first result: 100 episodes of six policies, without figures, in results/quick, where it
+            replaces the study that is there unless you give --resume or --out. An option that you give
+            counts, such as --episodes or --figures. The report is opened on a terminal with a screen.
     """
 
     episodes: int = 1000
@@ -99,14 +101,24 @@ class Comparison(KeepingOptions):
     quick: bool = False
 
 
-def shorten(options: Comparison) -> Comparison:
-    """What `quick` stands for; what the user chose stays."""
-    short = {"episodes": QUICK_EPISODES, "policies": QUICK_POLICIES, "out": QUICK_FOLDER}
-    chosen = {
-        name: value for name, value in short.items() if getattr(options, name) == getattr(Comparison, name)
-    }
-    begun = options.resume or "out" not in chosen
-    return replace(options, **chosen, figures=False, overwrite=options.overwrite or not begun)
+QUICK = Comparison(
+    episodes=QUICK_EPISODES, policies=QUICK_POLICIES, out=QUICK_FOLDER, figures=False, quick=True
+)
+"""What `--quick` stands for; an option that the user gives takes the place of the value here."""
+
+
+def read_options(arguments: Sequence[str] | None = None) -> Comparison:
+    """Read the command line.
+
+    Args:
+        arguments: words of it; those of the process by default.
+    """
+    read = partial(tyro.cli, Comparison, description=__doc__, args=arguments)
+    options = read()
+    if not options.quick:
+        return options
+    replaced = options.overwrite or (options.out is None and not options.resume)
+    return replace(read(default=QUICK), overwrite=replaced)
 
 
 def plan_study(options: Comparison) -> Study:
@@ -194,9 +206,6 @@ def compare(options: Comparison) -> list[PolicySummary]:
         OSError: the folder cannot be written.
     """
     existing = options.existing
-    if options.quick:
-        options = shorten(options)
-        existing = options.existing
     study = plan_study(options)
     choose_executor(options)
     for path in study.paths:
@@ -257,6 +266,6 @@ def report_study(out: Path, content: ReportContent, workers: int) -> None:
 def main() -> None:
     """Command line; a wrong option is one line on stderr and exit code 2."""
     tolerate_encoding()
-    options = tyro.cli(Comparison, description=__doc__)
+    options = read_options()
     with resumable():
         compare(options)
