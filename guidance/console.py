@@ -1,10 +1,12 @@
-"""What commands do to the console: whatever its encoding, printing must not fail what was computed."""
+"""What commands do to the console: no encoding fails them, and what a user did wrong is one line."""
 
 from __future__ import annotations
 
 import codecs
 import io
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 _HANDLER = "lunar-hda-console"
 _STAND_INS = {"\u2026": "~"}
@@ -29,3 +31,16 @@ def tolerate_encoding() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper) and stream.errors in ("strict", "surrogateescape"):
             stream.reconfigure(errors=_HANDLER)
+
+
+@contextmanager
+def one_line_errors() -> Iterator[None]:
+    """Turn a ValueError or OSError into one line on stderr and exit code 2."""
+    try:
+        yield
+    except (ValueError, OSError) as error:
+        from rich.console import Console
+
+        line = f"error: {error}"
+        Console(stderr=True).print(line, style="red", markup=False, highlight=False, soft_wrap=True)
+        sys.exit(2)

@@ -14,7 +14,7 @@ import tyro
 from numpy.typing import NDArray
 
 from guidance.arrays import Array
-from guidance.console import tolerate_encoding
+from guidance.console import one_line_errors, tolerate_encoding
 from guidance.validation import finite_number
 from hda.ground.library import Ground, load_tile
 from hda.policies.belief import LEVEL_SHARES, LEVELS
@@ -97,7 +97,8 @@ def main() -> None:
     """Print, or write, what was counted."""
     tolerate_encoding()
     options = tyro.cli(BeliefStatistics, description=__doc__)
-    levels, table = measure(options.tiles)
+    with one_line_errors():
+        levels, table = measure(options.tiles)
     out = sys.stdout.write
     out("levels of V_P: " + " ".join(f"{share:.4f}" for share in levels) + "\n")
     out("        in use: " + " ".join(f"{share:.4f}" for share in LEVEL_SHARES) + "\n")

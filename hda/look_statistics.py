@@ -16,10 +16,9 @@ from typing import Annotated
 
 import numpy as np
 import tyro
-from rich.console import Console
 from rich.progress import track
 
-from guidance.console import tolerate_encoding
+from guidance.console import one_line_errors, tolerate_encoding
 from guidance.validation import finite_number
 from hda.flight.episode import fly
 from hda.flight.record import EpisodeRecord
@@ -120,11 +119,8 @@ def main() -> None:
     """Print, or write, what was counted."""
     tolerate_encoding()
     options = tyro.cli(LookStatistics, description=__doc__)
-    try:
+    with one_line_errors():
         counts = count_readings(options)
-    except ValueError as error:
-        Console(stderr=True).print(f"error: {error}", style="red", markup=False, highlight=False)
-        sys.exit(2)
     out = sys.stdout.write
     out(f"{counts.cells.sum()} readings; share of safe ground\n" + describe_shares(counts))
     if options.write:

@@ -17,7 +17,7 @@ import numpy as np
 import tyro
 
 from guidance.arrays import Array
-from guidance.console import tolerate_encoding
+from guidance.console import one_line_errors, tolerate_encoding
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -239,7 +239,7 @@ def _figure(width: float, height: float) -> Figure:
 
 
 def main() -> None:
-    """Command line."""
+    """Command line; a wrong option is one line on stderr and exit code 2."""
     tolerate_encoding()
     command = tyro.cli(Command, description=__doc__)  # type: ignore[call-overload]
     drawers: dict[type, Any] = {
@@ -248,12 +248,10 @@ def main() -> None:
         GainsFigure: draw_gains,
         ComparisonFigure: draw_comparison,
     }
-    try:
+    with one_line_errors():
         figure = drawers[type(command)](command)
-    except ValueError as error:
-        sys.exit(f"error: {error}")
-    command.out.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(command.out)
+        command.out.parent.mkdir(parents=True, exist_ok=True)
+        figure.savefig(command.out)
     sys.stdout.write(f"wrote {command.out}\n")
 
 

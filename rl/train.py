@@ -18,7 +18,7 @@ from typing import Annotated
 
 import tyro
 
-from guidance.console import tolerate_encoding
+from guidance.console import one_line_errors, tolerate_encoding
 from rl.settings import RECIPES, RECURRENT_RECIPES, AgentSettings, RecurrentSettings
 from rl.training.export import ExportWeights, run_export
 from rl.training.train_autoencoder import TrainAutoencoder, run_autoencoder_training
@@ -118,10 +118,10 @@ def run_agent_training(options: TrainAgent, name: str) -> None:
 
 
 def main() -> None:
-    """Command line."""
+    """Command line; a wrong option is one line on stderr and exit code 2."""
     tolerate_encoding()
     command = tyro.cli(Command, description=__doc__)  # type: ignore[call-overload]
-    try:
+    with one_line_errors():
         if isinstance(command, ExportWeights):
             run_export(command)
             return
@@ -130,8 +130,6 @@ def main() -> None:
             run_autoencoder_training(command)
         else:
             run_agent_training(command, sys.argv[1])
-    except ValueError as error:
-        sys.exit(f"error: {error}")
 
 
 if __name__ == "__main__":

@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 import tyro
 
-from guidance.console import tolerate_encoding
-from rl.training_libraries import TrainingLibrariesError, require_training_libraries
+from guidance.console import one_line_errors, tolerate_encoding
+from rl.training_libraries import require_training_libraries
 
 
 @dataclass(frozen=True)
@@ -202,13 +202,11 @@ def measure_products(size: int = 1024, rounds: int = 20, precision: str = "highe
 
 
 def main() -> None:
-    """Command line."""
+    """Command line; a wrong option is one line on stderr and exit code 2."""
     tolerate_encoding()
     options = tyro.cli(TrainingSpeed, description=__doc__)
-    try:
+    with one_line_errors():
         require_training_libraries()
-    except TrainingLibrariesError as error:
-        sys.exit(f"error: {error}")
     speeds = measure_training_speed(options)
     reference = speeds["stable-baselines3"]
     for name, speed in speeds.items():

@@ -16,7 +16,7 @@ import tyro
 from rich.console import Console
 
 from guidance import solve_pdg, solve_pdg_many
-from guidance.console import tolerate_encoding
+from guidance.console import one_line_errors, tolerate_encoding
 from guidance.descent.residuals import fly_residuals
 from guidance.validation import finite_number
 from hda.flight.episode import advance, begin_flight, fly_legs, observe
@@ -24,7 +24,7 @@ from hda.policy import PrivilegedPolicy
 from hda.registry import make_policy
 from hda.task.scenario import sample_scenario
 from rl.training_libraries import TrainingLibrariesError, require_training_libraries
-from studies.campaign.command_line import one_line_errors, open_folder
+from studies.campaign.command_line import open_folder
 from studies.campaign.provenance import describe_run, write_provenance
 from studies.columns import Column, console_table, write_csv
 from studies.speed_ratios import COLUMNS as RATIO_COLUMNS

@@ -17,9 +17,9 @@ import numpy as np
 import tyro
 from rich.console import Console
 
-from guidance.console import tolerate_encoding
+from guidance.console import one_line_errors, tolerate_encoding
 from guidance.validation import finite_number
-from studies.campaign.command_line import one_line_errors, open_folder
+from studies.campaign.command_line import open_folder
 from studies.campaign.provenance import describe_run, write_provenance
 from studies.columns import Column, console_table, write_csv
 from studies.statistics.reliability import needed_episodes

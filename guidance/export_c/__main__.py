@@ -6,7 +6,7 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from guidance.console import tolerate_encoding
+from guidance.console import one_line_errors, tolerate_encoding
 from guidance.export_c.export import export_flight_code
 
 
@@ -29,11 +29,8 @@ def main(arguments: list[str] | None = None) -> None:
 
     tolerate_encoding()
     command = tyro.cli(ExportCommand, args=arguments)
-    try:
+    with one_line_errors():
         written = export_flight_code(command.out, command.overwrite)
-    except OSError as error:
-        sys.stderr.write(f"error: {error}\n")
-        raise SystemExit(2) from None
     sys.stdout.write("".join(f"{path}\n" for path in written))
     sys.stdout.write(f"make -C {command.out} check    # compiles it, and compares it with the vectors\n")
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from guidance.console import tolerate_encoding
+from guidance.console import one_line_errors, tolerate_encoding
 from guidance.descent.limits import Cone, Limits
 from guidance.descent.plan import GuidanceError, Plan
 from guidance.descent.residuals import RESIDUAL_UNITS
@@ -140,18 +140,16 @@ def main(arguments: list[str] | None = None) -> None:
     tolerate_encoding()
     command = tyro.cli(PdgCommand, args=arguments)
     try:
-        plan = command.solve()
-        if command.plot is not None:
-            from guidance.descent.picture import save_plan_figure
+        with one_line_errors():
+            plan = command.solve()
+            if command.plot is not None:
+                from guidance.descent.picture import save_plan_figure
 
-            save_plan_figure(plan, command.plot)
+                save_plan_figure(plan, command.plot)
     except GuidanceError as error:
         scope = "" if error.plan.certificate is None else f"\nproof: {error.plan.certificate.scope}"
         sys.stderr.write(f"no flight: {error}{scope}\n")
         raise SystemExit(1) from None
-    except (ValueError, OSError) as error:
-        sys.stderr.write(f"error: {error}\n")
-        raise SystemExit(2) from None
     sys.stdout.write(describe(plan) + "\n")
     if command.plot is not None:
         sys.stdout.write(f"picture         {command.plot}\n")

@@ -16,7 +16,7 @@ import numpy as np
 import tyro
 
 from guidance.arrays import Array
-from guidance.console import tolerate_encoding
+from guidance.console import one_line_errors, tolerate_encoding
 from hda.flight.episode import fly
 from hda.flight.moment import SIZE, draw_moment, find_moment
 from hda.flight.outcome import ENDINGS
@@ -163,12 +163,10 @@ def film_flight(
 
 
 def main() -> None:
-    """Run the command."""
+    """Run the command; a wrong option is one line on stderr and exit code 2."""
     tolerate_encoding()
-    try:
+    with one_line_errors():
         tyro.cli(film_flight, prog="python -m hda.flight.film", description=__doc__)
-    except ValueError as error:
-        raise SystemExit(f"error: {error}") from None
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 from rich.console import Console
 
-from guidance.console import tolerate_encoding
+from guidance.console import one_line_errors, tolerate_encoding
 from hda.safety.criteria import DEFAULT_CRITERIA, SafetyCriteria
 from hda.safety.safety_map import assess_safety
 from hda.terrain.base_surface import rms_slope
@@ -67,9 +67,10 @@ def show_terrain(
 
 
 def main() -> None:
-    """Run the command."""
+    """Run the command; a wrong option is one line on stderr and exit code 2."""
     tolerate_encoding()
-    tyro.cli(show_terrain)
+    with one_line_errors():
+        tyro.cli(show_terrain)
 
 
 if __name__ == "__main__":

@@ -9,17 +9,8 @@ from pathlib import Path
 
 from rich.console import Console
 
+from guidance.console import one_line_errors
 from hda.registry import policy_entry, policy_names
-
-
-@contextmanager
-def one_line_errors() -> Iterator[None]:
-    """Turn a ValueError or OSError into one line on stderr and exit code 2."""
-    try:
-        yield
-    except (ValueError, OSError) as error:
-        Console(stderr=True).print(f"error: {error}", style="red", markup=False, highlight=False)
-        sys.exit(2)
 
 
 @contextmanager

@@ -69,7 +69,7 @@ def test_every_shipped_policy_flies_without_them() -> None:
 )
 def test_training_names_the_extra_in_one_line(words: tuple[str, ...]) -> None:
     done = run_command("rl.train", *words)
-    assert done.returncode == 1
+    assert done.returncode == 2
     assert done.stderr.count("\n") == 1
     assert "pip install 'lunar-hda[train]'" in done.stderr
     assert "torch, stable_baselines3" in done.stderr
@@ -81,7 +81,7 @@ def test_training_names_the_extra_in_one_line(words: tuple[str, ...]) -> None:
 )
 def test_what_else_needs_them_names_it_too(module: str, words: tuple[str, ...]) -> None:
     done = run_command(module, *words)
-    assert done.returncode == 1
+    assert done.returncode == 2
     assert "lunar-hda[train]" in done.stderr
     assert "Traceback" not in done.stderr
 
