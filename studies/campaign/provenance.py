@@ -8,6 +8,8 @@ import json
 import platform
 import subprocess
 import sys
+from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import asdict
 from datetime import UTC, datetime
 from importlib import metadata
@@ -27,6 +29,8 @@ _PACKAGES = (
     "numpy",
     "scipy",
 )
+_TRAINING_PACKAGES = ("sb3-contrib", "stable-baselines3", "torch")
+"""Named in the provenance alone: they are optional, and no row depends on them."""
 
 
 def git_commit() -> str | None:
@@ -136,7 +140,16 @@ def _describe_making() -> dict[str, Any]:
         "command": " ".join(sys.argv),
         "finished": datetime.now(UTC).isoformat(timespec="seconds"),
         "git_commit": git_commit(),
+        "training_versions": _installed_versions(_TRAINING_PACKAGES),
     }
+
+
+def _installed_versions(packages: Iterable[str]) -> dict[str, str]:
+    found = {}
+    for name in packages:
+        with suppress(metadata.PackageNotFoundError):
+            found[name] = metadata.version(name)
+    return found
 
 
 def write_provenance(path: Path, provenance: dict[str, Any]) -> None:
