@@ -57,6 +57,21 @@ def test_the_readme_is_short() -> None:
     assert len(text.encode()) <= 9000
 
 
+def test_the_architecture_lists_every_cache() -> None:
+    page = read_page("docs/explanation/architecture.md")
+    sources = [
+        path for package in ("guidance", "hda", "rl", "studies") for path in (ROOT / package).rglob("*.py")
+    ]
+    cached = re.compile(r"^ *@(?:functools\.)?(?:lru_)?cache\b", re.MULTILINE)
+    modules = {
+        ".".join(path.relative_to(ROOT).with_suffix("").parts)
+        for path in sources
+        if cached.search(path.read_text(encoding="utf-8"))
+    }
+    assert len(modules) > 15
+    assert {module for module in modules if f"`{module}`" not in page} == set()
+
+
 @pytest.mark.parametrize("page", WRITTEN)
 def test_no_page_is_long(page: str) -> None:
     assert read_page(page).count("\n") <= MOST_LINES
@@ -144,9 +159,14 @@ def test_every_option_of_a_command_exists(command: str) -> None:
     assert {option for option in options if option not in shown.stdout} == set()
 
 
-@pytest.mark.parametrize("page", PAGES)
+def newest_changes() -> str:
+    """Of the change log the newest section alone: what older versions named may be gone."""
+    return "## [".join(read_page("CHANGELOG.md").split("\n## [")[:2])
+
+
+@pytest.mark.parametrize("page", [*PAGES, "CHANGELOG.md"])
 def test_every_file_that_a_page_names_exists(page: str) -> None:
-    text = read_page(page)
+    text = newest_changes() if page == "CHANGELOG.md" else read_page(page)
     for name in re.findall(r"`((?:guidance|hda|rl|studies|tests|examples|docs)/[\w/.+-]*)`", text):
         if "NAME" not in name:
             assert (ROOT / name).exists(), f"{page} names {name}, which does not exist"
