@@ -145,6 +145,7 @@ def test_a_results_page_names_command_and_date(page: Path) -> None:
     assert re.search(r"python -m studies|make compare", text)
     assert re.search(r"\b20\d\d-\d\d-\d\d\b", text)
     rows = re.findall(r"^\| code, date \| (.*) \|$", text, re.MULTILINE)
+    assert rows, "no row names the code and the date"
     for row in rows:
         known = {
             commit: subprocess.run(["git", "cat-file", "-e", f"{commit}^{{commit}}"], cwd=ROOT).returncode
