@@ -1,7 +1,7 @@
 """What a comparison shows while it runs: a bar with the time left, and below it the table so far.
 
-On a terminal both are drawn in place and go when they are done. Anywhere else plain lines say the same, at
-most ten of them for a phase.
+On a terminal both are drawn in place and go when they are done. Anywhere else plain lines say the same: one
+as a phase begins, and at most ten as it goes on.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from rich.live import Live
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TaskID, TextColumn
 from rich.text import Text
 
-_LINES = 10  # at most, of a phase, where the output is no terminal
+_LINES = 10  # at most, as a phase goes on, where the output is no terminal
 _PAUSE = 2.0  # [s] at least, between two of them
 _REDRAW = 1.0  # [s] at least, between two tables on a terminal
 
