@@ -13,7 +13,7 @@ from typing import Annotated, Any
 
 import tyro
 
-from guidance.console import tolerate_encoding
+from guidance.console import one_line_errors, tolerate_encoding
 from rl.inference.artefacts import WEIGHTS_FOLDER, read_card
 from rl.policies.catalogue import entries
 
@@ -128,8 +128,9 @@ def main() -> None:
     if options.out is None:
         sys.stdout.write(page)
         return
-    options.out.parent.mkdir(parents=True, exist_ok=True)
-    options.out.write_text(page, encoding="utf-8")
+    with one_line_errors():
+        options.out.parent.mkdir(parents=True, exist_ok=True)
+        options.out.write_text(page, encoding="utf-8")
     sys.stdout.write(f"wrote {options.out}\n")
 
 

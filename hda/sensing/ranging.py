@@ -27,7 +27,7 @@ class RangingLidar:
     """A scanning LIDAR that gives ranges, and what is made of them on board.
 
     Attributes:
-        rays: along each side of the scan (flash LIDARs of ALHAT's kind: 128; sensors.md 1).
+        rays: along each side of the scan (flash LIDARs of ALHAT's kind: 128).
         field_of_view: [rad] the scan covers a square of side range x tan(field_of_view) on the target plane
             (the paper's 11.4 deg).
         margin: [m] by which the scan reaches beyond that square on every side, so that Algorithm 1 can judge
