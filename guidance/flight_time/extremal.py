@@ -14,7 +14,8 @@ from guidance.arrays import Array
 from guidance.kernel import compile_kernel
 
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(8)
-_PARTS = 4  # of a burn on each side of a touch: the primer may turn fast there
+_SHRINK = 0.4  # ratio of one part of a burn to the next one, towards where its primer is shortest
+_MOST_LEVELS = 20
 LEGS = 12
 """Parts of an arc in a flown path."""
 
@@ -52,6 +53,15 @@ class Extremal(NamedTuple):
     primer: Array
     times: Array
     touch: Array
+
+
+class Primer(NamedTuple):
+    """A primer vector, in the site frame, and its length."""
+
+    east: float
+    north: float
+    up: float
+    length: float
 
 
 class Burn(NamedTuple):
@@ -116,38 +126,76 @@ def in_unit(problem: PrimerProblem, unit: float) -> PrimerProblem:
 
 
 @compile_kernel
+def primer_at(x: Extremal, time: float) -> Primer:
+    """The primer vector at a time."""
+    fraction = (time - x.times[0]) / (x.times[1] - x.times[0])
+    east = x.primer[0, 0] + (x.primer[1, 0] - x.primer[0, 0]) * fraction
+    north = x.primer[0, 1] + (x.primer[1, 1] - x.primer[0, 1]) * fraction
+    up = x.primer[0, 2] + (x.primer[1, 2] - x.primer[0, 2]) * fraction
+    if time < x.touch[0]:
+        up += x.touch[1] * (x.touch[0] - time)
+    return Primer(east, north, up, math.sqrt(east * east + north * north + up * up))
+
+
+@compile_kernel
 def set_primer(x: Extremal, time: float, p: Array) -> None:
     """Write the primer vector at a time, shape (3,)."""
-    fraction = (time - x.times[0]) / (x.times[1] - x.times[0])
-    for axis in range(3):
-        p[axis] = x.primer[0, axis] + (x.primer[1, axis] - x.primer[0, axis]) * fraction
-    if time < x.touch[0]:
-        p[2] += x.touch[1] * (x.touch[0] - time)
+    p[0], p[1], p[2], _ = primer_at(x, time)
 
 
 @compile_kernel
 def set_direction(x: Extremal, time: float, p: Array) -> None:
     """Write the unit vector of the primer at a time, shape (3,)."""
-    set_primer(x, time, p)
-    size = max(math.sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]), 1e-12)
-    for axis in range(3):
-        p[axis] /= size
+    primer = primer_at(x, time)
+    size = max(primer.length, 1e-12)
+    p[0], p[1], p[2] = primer.east / size, primer.north / size, primer.up / size
 
 
 @compile_kernel
 def add_burn(x: Extremal, burn: Burn, mass_flow: float, then: float, out: Array) -> None:
     """Add to out = (r, v), at the time `then`, what a burn contributes."""
-    touch = x.touch[0]
     if not (touches(x) and burn.begin < x.times[0]):
         _add_smooth_burn(x, burn, mass_flow, then, out)
         return
-    mark = min(max(touch, burn.begin), burn.end)
+    mark = min(max(x.touch[0], burn.begin), burn.end)
     for begin, end in ((burn.begin, mark), (mark, burn.end)):
-        part = (end - begin) / _PARTS
-        for k in range(_PARTS if part > 0.0 else 0):
-            at = begin + k * part
-            mass = burn.mass - mass_flow * (at - burn.begin)
-            _add_smooth_burn(x, Burn(at, at + part, mass), mass_flow, then, out)
+        if end > begin:
+            left = burn.mass - mass_flow * (begin - burn.begin)
+            _add_turning_burn(x, Burn(begin, end, left), mass_flow, then, out)
+
+
+@compile_kernel
+def _add_turning_burn(x: Extremal, burn: Burn, mass_flow: float, then: float, out: Array) -> None:
+    """The same next to a touch, where the primer may be short and turn fast.
+
+    The parts of its quadrature shrink towards the time at which the primer is shortest, down to the time
+    that it takes to turn there.
+    """
+    first, last, length = np.empty(3), np.empty(3), burn.end - burn.begin
+    set_primer(x, burn.begin, first)
+    set_primer(x, burn.end, last)
+    along, square = 0.0, 0.0
+    for axis in range(3):
+        along -= first[axis] * (last[axis] - first[axis])
+        square += (last[axis] - first[axis]) ** 2
+    share = min(max(along / max(square, 1e-300), 0.0), 1.0)
+    least = 0.0
+    for axis in range(3):
+        least += (first[axis] + share * (last[axis] - first[axis])) ** 2
+    levels = 0
+    while levels < _MOST_LEVELS and square * _SHRINK ** (2 * levels) > least:
+        levels += 1
+    nearest = burn.begin + share * length
+    for edge in (burn.begin, burn.end):
+        span, inner = edge - nearest, 0.0
+        for level in range(levels, -1 if span != 0.0 else levels, -1):
+            outer = _SHRINK**level
+            begin, end = nearest + span * inner, nearest + span * outer
+            if span < 0.0:
+                begin, end = end, begin
+            left = burn.mass - mass_flow * (begin - burn.begin)
+            _add_smooth_burn(x, Burn(begin, end, left), mass_flow, then, out)
+            inner = outer
 
 
 @compile_kernel
@@ -156,11 +204,11 @@ def _add_smooth_burn(x: Extremal, burn: Burn, mass_flow: float, then: float, out
     half, begin, span = 0.5 * (burn.end - burn.begin), x.times[0], x.times[1] - x.times[0]
     ax, ay, az = x.primer[0, 0], x.primer[0, 1], x.primer[0, 2]
     bx, by, bz = x.primer[1, 0] - ax, x.primer[1, 1] - ay, x.primer[1, 2] - az
-    if burn.begin < x.touch[0]:
+    if burn.begin + half < x.touch[0]:
         az += x.touch[1] * (x.touch[0] - begin)
         bz -= x.touch[1] * span
     rx, ry, rz, vx, vy, vz = out[0], out[1], out[2], out[3], out[4], out[5]
-    for k in range(_POINTS.size):  # in scalars: several times faster than in small arrays
+    for k in range(_POINTS.size):  # `primer_at` with what does not change taken out of the loop
         elapsed = half * (1.0 + _POINTS[k])
         fraction = (burn.begin + elapsed - begin) / span
         px, py, pz = ax + bx * fraction, ay + by * fraction, az + bz * fraction

@@ -23,7 +23,14 @@ from typing import NamedTuple
 import numpy as np
 
 from guidance.arrays import Array
-from guidance.flight_time.extremal import Extremal, PrimerProblem, copy_extremal, in_unit, new_extremal
+from guidance.flight_time.extremal import (
+    Extremal,
+    PrimerProblem,
+    copy_extremal,
+    in_unit,
+    new_extremal,
+    no_touch,
+)
 from guidance.flight_time.linear_system import solve_linear
 from guidance.flight_time.primer_equations import ANGLES, move_extremal, residuals, set_jacobian
 from guidance.kernel import compile_kernel
@@ -64,10 +71,13 @@ def _solve_fixed(jacobian: Array, right: Array, unit: float, step: Array) -> Non
 
 @compile_kernel
 def find_neighbours(extremal: Extremal, problem: PrimerProblem) -> Neighbours:
-    """Neighbours of an extremal, or of nearly one, of a problem; both in seconds as in `solve_primer`."""
+    """Neighbours of an extremal, or of nearly one, of a problem; both in seconds as in `solve_primer`.
+
+    It does not touch the ground.
+    """
     unit = extremal.times[2]
     scaled = in_unit(problem, unit)
-    x = Extremal(extremal.primer, extremal.times / unit, extremal.touch)
+    x = Extremal(extremal.primer, extremal.times / unit, no_touch())
     here, frame, jacobian = np.empty(7), np.empty((4, 3)), np.empty((7, 7))
     residuals(x, scaled, here)
     set_jacobian(x, scaled, here, frame, new_extremal(), jacobian)

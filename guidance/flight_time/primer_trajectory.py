@@ -10,12 +10,20 @@ import numpy as np
 from guidance.arrays import Array
 from guidance.descent.problem import LandingProblem
 from guidance.descent.trajectory import Trajectory
-from guidance.flight_time.extremal import Burn, Extremal, PrimerProblem, add_burn, set_direction, touches
+from guidance.flight_time.extremal import (
+    Burn,
+    Extremal,
+    PrimerProblem,
+    add_burn,
+    set_direction,
+    touches,
+)
 from guidance.flight_time.primer_vector import PrimerFlight, scale_landing
 from guidance.kernel import compile_kernel
 
 _SLIVER = 1e-9
 """Of the time of flight: how far the two nodes of a switch, one before it and one after, lie apart."""
+_CLOSER = 3  # power by which nodes approach a touch
 _LONGEST_PART = 0.1  # of the time of flight: of a burn, in its quadrature
 
 
@@ -78,7 +86,8 @@ def lay_nodes(problem: LandingProblem, flight: PrimerFlight, nodes: int) -> Prim
 def _node_times(x: Extremal, nodes: int) -> Array:
     """[s] the nodes of every arc, from the start to the end.
 
-    A touch of the ground, where the thrust goes on, is one node; a switch of the engine is two.
+    A touch of the ground, where the thrust goes on, is one node, and they stand closer next to it, where the
+    thrust turns fast; a switch of the engine is two.
     """
     final, share, laid, arcs = x.times[2], 0.0, 0, 0
     ends = np.empty(4)
@@ -97,7 +106,12 @@ def _node_times(x: Extremal, nodes: int) -> Array:
         share += free * (end - max(begin, 0.0)) / final
         count = 2 + (free if arc == arcs - 1 else round(share)) - before
         for node in range(count):
-            out[laid + node] = begin + (end - begin) * node / (count - 1)
+            share_of_arc = node / (count - 1)
+            if touched and arc == 0:
+                share_of_arc = 1.0 - (1.0 - share_of_arc) ** _CLOSER
+            elif touched and arc == 1:
+                share_of_arc = share_of_arc**_CLOSER
+            out[laid + node] = begin + (end - begin) * share_of_arc
         laid += count
         out[laid - 1] = end
         begin = end + _SLIVER * final
@@ -134,7 +148,7 @@ def _sample(x: Extremal, max_thrust: float, times: Array, out: Array) -> None:
         if not _burning(x, 0.5 * (times[k] + times[k + 1])):
             out[k] = 0.0
             continue
-        for part in range(parts + 1):
+        for part in range(parts + 1):  # `primer_at` with what does not change taken out of the loop
             time = times[k] + part * step
             since = time - x.times[0]
             east, north = first[0] + turn[0] * since, first[1] + turn[1] * since

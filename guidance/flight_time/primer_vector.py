@@ -92,7 +92,7 @@ def scale_landing(problem: LandingProblem) -> PrimerProblem:
 
 
 def find_primer_flight(problem: LandingProblem, time: float | None = None) -> PrimerFlight | None:
-    """Flight of least propellant by the indirect method, in some 0.05 ms.
+    """Flight of least propellant by the indirect method.
 
     Where it would cut through the target's altitude in its first burn, the one that touches it there.
 

@@ -11,10 +11,9 @@ from guidance.arrays import Array
 from guidance.descent.certificate import Certificate
 from guidance.descent.dual_bound import DualBound, DualPiece
 from guidance.descent.problem import LandingProblem
-from guidance.flight_time.extremal import set_primer, touches
 from guidance.flight_time.primer_vector import PrimerFlight
 from guidance.lower_bound.dual_ascent import two_impulse_primer
-from guidance.lower_bound.dual_case import DualCase, dual_case
+from guidance.lower_bound.dual_case import dual_case
 from guidance.lower_bound.dual_function import AFFINE, THETA
 from guidance.lower_bound.neighbour_cover import primer_of
 from guidance.lower_bound.time_cover import (
@@ -128,19 +127,8 @@ def _cover(
 ) -> tuple[Array, TimeCover]:
     case = dual_case(problem, most)
     times = time_grid(case, aim.target * (1.0 + 1e-12), time, _CELLS)
-    start = two_impulse_primer(time, case) if flight is None else _primer_along(flight, case)
+    start = two_impulse_primer(time, case) if flight is None else primer_of(flight.extremal, case)
     return times, cover_times(times, case, start, time, aim)
-
-
-def _primer_along(flight: PrimerFlight, case: DualCase) -> Array:
-    """The primer of a flight, shape (6,); or (10,) where it touches the ground."""
-    x = flight.extremal
-    primer, last = primer_of(x, case), np.empty(3)
-    if not touches(x):
-        return primer
-    set_primer(x, flight.time, last)
-    scale = float(np.linalg.norm(primer[:3]) / np.linalg.norm(last))
-    return np.concatenate([primer, [0.0, 0.0, scale * x.touch[1], flight.time - x.touch[0]]])
 
 
 def _bound_at(problem: LandingProblem, most: float, time: float) -> DualBound:

@@ -10,7 +10,7 @@ from guidance.flight_time.primer_vector import PrimerFlight
 METHOD = "indirect"
 NOT_FOUND = (
     "the indirect method found no flight that keeps the limits; it knows no least thrust, no velocity at the"
-    " target and no limit that binds, and method 'auto' asks others then"
+    " target and no limit that binds but a touch of the ground, and method 'auto' asks others then"
 )
 
 

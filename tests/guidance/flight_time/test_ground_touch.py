@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from descents import GRAVITY, TARGET, harsh_start
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 import guidance
@@ -71,13 +71,13 @@ def test_it_touches_the_ground_once_at_no_vertical_speed_under_another_integrato
     assert 0.0 < x.touch[0] < flight.first_burn
     times, states = fly_past(problem, flight)
     height = states[:, 2] - TARGET[2]
-    assert np.linalg.norm(states[-1, :3] - TARGET) < 0.05
-    assert np.linalg.norm(states[-1, 3:6]) < 5e-3
+    assert np.linalg.norm(states[-1, :3] - TARGET) < 1e-5
+    assert np.linalg.norm(states[-1, 3:6]) < 1e-5
     at = int(np.argmin(np.abs(times - x.touch[0])))
-    assert height[at] == pytest.approx(0.0, abs=5e-3)
-    assert states[at, 5] == pytest.approx(0.0, abs=5e-3)
+    assert height[at] == pytest.approx(0.0, abs=1e-5)
+    assert states[at, 5] == pytest.approx(0.0, abs=1e-5)
     away = (np.abs(times - x.touch[0]) > 0.2) & (times < flight.time - 0.1)
-    assert height.min() > -5e-3
+    assert height.min() > -1e-5
     assert height[away].min() > 0.02
 
 
@@ -95,23 +95,22 @@ def test_its_primer_bends_upward_at_the_touch_and_the_hamiltonian_vanishes_after
     coast = int(np.argmin(np.abs(times - 0.5 * (flight.first_burn + flight.braking))))
     primer = x.primer[0] + slope * (times[coast] - x.times[0])
     terms = float(primer @ problem.gravity), float(slope @ states[coast, 3:6])
-    assert terms[0] == pytest.approx(terms[1], abs=2e-3)
+    assert terms[0] == pytest.approx(terms[1], abs=1e-5)
     assert np.linalg.norm(primer) < 1.0
 
 
 def test_the_cones_find_the_same_flight_on_a_fine_mesh():
     """On 61 nodes they dip between nodes, which saves up to a tenth of a kilogram; on 201 next to nothing."""
-    rng, found = np.random.default_rng(77), 0
-    while found < 25:
+    rng, compared = np.random.default_rng(77), 0
+    for _ in range(1500):
         plan = guidance.solve_pdg(harsh_start(rng), TARGET, throw=False)
         if plan.method != "indirect" or not touches(flight_of(plan).extremal):
             continue
-        found += 1
         convex = guidance.solve_pdg(plan.problem.state, TARGET, method="convex", throw=False, nodes=201)
-        assert plan.keeps_limits
-        assert plan.residuals.position < 0.05
         if convex.status is PlanStatus.OPTIMAL:
+            compared += 1
             assert plan.propellant == pytest.approx(convex.propellant, abs=0.02)
+    assert compared >= 15
 
 
 def test_its_gap_is_proved_by_a_kinked_primer():
@@ -167,9 +166,11 @@ def test_there_is_no_touch_unless_it_is_found():
 
 @settings(max_examples=60)
 @given(seed=st.integers(0, 10**6))
+@example(seed=107743)  # its primer turns by a right angle within milliseconds
+@example(seed=12189)
 def test_any_harsh_flight_of_the_indirect_method_is_flown_within_its_limits(seed):
     plan = guidance.solve_pdg(harsh_start(np.random.default_rng(seed)), TARGET, throw=False)
     assume(plan.method == "indirect" and plan.status is PlanStatus.OPTIMAL)
-    assert plan.residuals.position < 0.05
-    assert plan.residuals.altitude < 0.01
-    assert plan.residuals.landing_velocity < 5e-3
+    assert plan.residuals.position < 5e-3
+    assert plan.residuals.altitude < 5e-3
+    assert plan.residuals.landing_velocity < 1e-3

@@ -99,3 +99,14 @@ def test_the_support_function_is_the_greatest_product_over_the_cone():
             assert value == pytest.approx(np.tensordot(p, cone, 1).max(), abs=2e-4 * float(np.linalg.norm(p)))
             assert value == pytest.approx(p @ direction, abs=1e-12)
             assert np.linalg.norm(direction) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("time", [2.0, 3.0, 5.0])
+def test_where_the_dual_function_has_no_maximum_the_ascent_stops_a_little_above_what_is_enough(time):
+    """No flight of so few seconds exists; a far longer primer would bound no other time."""
+    start = [200.0, 100.0, 950.0, -8.0, -4.0, -30.0, 1200.0]
+    case = dual_case(LandingProblem(State.parse(start), TARGET, PAPER_LANDER, GRAVITY), 130.0)
+    for enough in (200.0, 800.0):
+        found = ascend(two_impulse_primer(time, case), affine_basis(time), time, case, 1e-4, enough)
+        assert enough < found.value < 1.5 * enough
+        assert not found.stalled
