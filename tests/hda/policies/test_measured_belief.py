@@ -206,8 +206,8 @@ def test_it_is_calibrated_on_tiles_that_it_was_not_counted_on(preset: str):
         (0.9, 1.0, 0.04),
     ):
         own = (probability >= low) & (probability <= high)
-        if own.sum() > 3000:
-            assert safe[own].mean() == pytest.approx(probability[own].mean(), abs=slack), (low, high)
+        assert own.sum() > 3000, (low, high)
+        assert safe[own].mean() == pytest.approx(probability[own].mean(), abs=slack), (low, high)
 
 
 def test_the_counts_name_their_command_and_rise_with_the_reading(tmp_path):
@@ -237,7 +237,7 @@ def test_the_counts_name_their_command_and_rise_with_the_reading(tmp_path):
         read_counts(tmp_path / "counts.json")
 
 
-def test_every_reading_of_a_flight_is_counted_once_with_the_truth_under_it():
+def test_every_class_that_a_look_gave_or_changed_is_counted_with_the_truth_under_it():
     (record,) = flights("lidar", range(1), "train")
     counts = ReadingCounts(np.zeros(SHAPE, dtype=np.int64), np.zeros(SHAPE, dtype=np.int64))
     count_record(record, counts)
@@ -252,3 +252,12 @@ def test_every_reading_of_a_flight_is_counted_once_with_the_truth_under_it():
     assert 0 < counts.safe.sum() < 0.3 * counts.cells.sum()
     again = count_readings(LookStatistics(episodes=1, rays=(128,)))
     assert same(again, counts)
+
+
+@pytest.mark.parametrize("error", ["navigation_position_error", "navigation_velocity_error"])
+def test_looks_that_lie_beside_their_ground_are_not_counted(error: str, monkeypatch: pytest.MonkeyPatch):
+    preset = hda.PRESETS["lidar"]
+    lost = replace(preset, name="lost", rules=replace(preset.rules, **{error: 0.5}))
+    monkeypatch.setitem(hda.PRESETS, "lost", lost)
+    with pytest.raises(ValueError, match="preset must have no navigation errors"):
+        count_readings(LookStatistics(episodes=1, preset="lost"))
