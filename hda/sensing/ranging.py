@@ -177,6 +177,14 @@ class _Timing(NamedTuple):
     latency: float
 
 
+class _RayDraws(NamedTuple):
+    """The part of `ScanDraws` that each ray has of its own."""
+
+    range: NDArray[np.float32]
+    jitter: NDArray[np.float32]
+    dropout: NDArray[np.float32]
+
+
 class _Echoes(NamedTuple):
     """Where the kernel writes: `PointCloud` with a place for every ray."""
 
@@ -190,7 +198,7 @@ def _scan_into(
     view: _View,
     errors: _Errors,
     timing: _Timing,
-    draws: tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]],
+    draws: _RayDraws,
     echoes: _Echoes,
 ) -> int:
     """Send every ray; return the number of echoes written."""
@@ -276,7 +284,7 @@ def scan(
             lidar.ray_dropout,
         ),
         _Timing(lidar.scan_duration, lidar.latency),
-        (draws.range, draws.jitter, draws.dropout),
+        _RayDraws(draws.range, draws.jitter, draws.dropout),
         _Echoes(offset, deviation),
     )
     return PointCloud(offset[:count], deviation[:count])
