@@ -23,7 +23,7 @@ class SiteBlock(NamedTuple):
 
     row: int
     start: int
-    count: int
+    sites: int
 
 
 class PlaneGradients(NamedTuple):
