@@ -1,7 +1,8 @@
 """Count on the training tiles what a reading of a measured look is worth: how often such ground is safe.
 
 `nearest-safe` flies over the training tiles with ranging LIDARs of several numbers of rays; every look is
-fused as a belief does it, and every site that the look read is counted in its class, safe or not.
+fused as a belief does it, and every cell whose class the look gave or changed is counted in it, safe or not.
+The truth is read where the vehicle believes the cell to be, so the preset may have no navigation errors.
 
 python -m hda.look_statistics         counts, and prints the shares beside those in use
 python -m hda.look_statistics --write counts, and writes hda/policies/measured_readings.json
@@ -89,11 +90,16 @@ def count_readings(options: LookStatistics) -> ReadingCounts:
     """Fly and count.
 
     Raises:
-        ValueError: the preset is unknown, or has no ranging LIDAR.
+        ValueError: the preset is unknown, has no ranging LIDAR, or has navigation errors.
     """
     preset = find_preset(options.preset)
     if not isinstance(preset.lidar, RangingLidar):
         raise ValueError(f"preset must have a ranging LIDAR, such as lidar; {preset.name!r} has none")
+    if preset.rules.navigation_position_error > 0.0 or preset.rules.navigation_velocity_error > 0.0:
+        raise ValueError(
+            f"preset must have no navigation errors, such as lidar; {preset.name!r} puts its looks beside the"
+            " ground that they show"
+        )
     counts = ReadingCounts(np.zeros(SHAPE, dtype=np.int64), np.zeros(SHAPE, dtype=np.int64))
     pilot = make_policy("nearest-safe")
     flights = [(rays, episode) for rays in options.rays for episode in range(options.episodes)]

@@ -60,6 +60,23 @@ class FilmOptions:
             raise ValueError(f"width must lie between 200 and 3000 pixels, got {self.width}")
 
 
+@dataclass(frozen=True)
+class FilmedEpisode:
+    """Which episode is filmed.
+
+    Attributes:
+        preset: setting.
+        episode: number of the episode.
+        study_seed: seed of the study that the episode is from.
+        split: tiles: train, tuning, validation or fresh.
+    """
+
+    preset: str = "paper"
+    episode: int = 17
+    study_seed: int = 0
+    split: str = "validation"
+
+
 def film_frames(record: EpisodeRecord, options: FilmOptions) -> Iterator[Image]:
     """Frames of the film of a flight, from its start to its touchdown, as RGB images."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -125,10 +142,7 @@ def _check_name(path: Path) -> None:
 
 def film_flight(
     policy: str = "hazard-aware",
-    preset: str = "paper",
-    episode: int = 17,
-    study_seed: int = 0,
-    split: str = "validation",
+    flown: Annotated[FilmedEpisode, tyro.conf.arg(name="")] = FilmedEpisode(),
     out: Annotated[Path, tyro.conf.arg(metavar="FILE")] = Path("flight.gif"),
     film: Annotated[FilmOptions, tyro.conf.arg(name="")] = FilmOptions(),
 ) -> None:
@@ -136,10 +150,7 @@ def film_flight(
 
     Args:
         policy: name of a policy or an agent, or package.module:Name of your own.
-        preset: setting.
-        episode: number of the episode.
-        study_seed: seed of the study that the episode is from.
-        split: tiles: train, tuning, validation or fresh.
+        flown: which episode.
         out: GIF to write.
         film: how it is filmed.
     """
@@ -151,10 +162,12 @@ def film_flight(
         importlib.import_module("rl")  # as an entry point would: it registers the agents
     _check_name(out)
     sys.stdout.write(
-        f"flying {policy} on {preset}, episode {episode} (the first flight on a machine compiles)\n"
+        f"flying {policy} on {flown.preset}, episode {flown.episode}"
+        " (the first flight on a machine compiles)\n"
     )
     sys.stdout.flush()
-    record = fly(make_policy(policy), sample_scenario(preset, study_seed, episode, split))
+    scenario = sample_scenario(flown.preset, flown.study_seed, flown.episode, flown.split)
+    record = fly(make_policy(policy), scenario)
     times = frame_times(record, film)
     frames = list(track(film_frames(record, film), description="drawing", total=len(times)))
     save_frames(out, frames, film)

@@ -27,7 +27,9 @@ from hda.policies.site_price import (
     propellant_map,
 )
 from hda.policies.surroundings import infer_unseen
+from hda.sensing.gridding import PIXEL_SIZES, ElevationMap, PixelGrid
 from hda.sensing.lidar import Lidar
+from hda.sensing.measured_look import MeasuredGround, assess_elevation
 from hda.sensing.ranging import RangingLidar
 from hda.task.observation import Observation, ScenarioView
 from hda.task.rules import Rules
@@ -74,7 +76,7 @@ class HazardAwareSite:
 
     def begin(self, view: ScenarioView) -> HazardAwareMemory:
         """Nothing seen yet."""
-        load_kernels()
+        load_kernels(ranging=isinstance(view.lidar, RangingLidar))
         return HazardAwareMemory(view)
 
     def price(
@@ -114,14 +116,28 @@ class HazardAwareSite:
         return belief.site(*best, float(observation.target[2])), memory
 
 
-@lru_cache(maxsize=1)
-def load_kernels() -> None:
-    """Price a small blank square once per process: the first decision must not wait for compiled code."""
+@lru_cache(maxsize=2)
+def load_kernels(*, ranging: bool) -> None:
+    """Fuse and price a small look once per process: the first decision must not wait for compiled code.
+
+    Args:
+        ranging: the looks to come measure ranges.
+    """
     gravity, plane = np.array(MOON_GRAVITY), np.zeros(3)
-    lidar, lander = Lidar(), Lander()
+    lidar, lander = RangingLidar() if ranging else Lidar(), Lander()
     view = ScenarioView(lander, gravity, plane, Rules(), lidar)
     state = State(np.array([0.0, 0.0, 100.0]), np.zeros(3), 1200.0)
     reading = np.ones((lidar.pixels, lidar.pixels), dtype=np.float32)
-    observation = Observation(0, 0.0, state, plane, reading, 16.0, 20.0)
-    belief = SafetyBelief.blank(plane, 2 * LATTICE).fused(observation, lidar)
+    ground = _level_ground(view) if ranging else None
+    observation = Observation(0, 0.0, state, plane, reading, 16.0, 20.0, ground)
+    belief = fuse_look(observation, view, fuse_look(observation, view, None))
     HazardAwareSite().price(observation, view, belief)
+
+
+def _level_ground(view: ScenarioView) -> MeasuredGround:
+    """A measured look at a square just larger than the lander."""
+    side = 2 * math.ceil(view.criteria.footprint_diameter)
+    grid = PixelGrid(-side // 2, -side // 2, PIXEL_SIZES[0], side, side)
+    height, spread = np.zeros(grid.shape), np.full(grid.shape, 0.01)
+    elevation = ElevationMap(grid, height, spread, np.ones(grid.shape, dtype=np.int32))
+    return assess_elevation(elevation, view.criteria)

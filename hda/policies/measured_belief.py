@@ -1,9 +1,9 @@
 """What all measured looks so far say of the ground, cell by cell.
 
 The scans are fused on one elevation map for each size of cells, and each map is assessed by Algorithm 1. A
-cell of the belief keeps the reading of the finest map that knows it; how often ground is safe that reads so
-was counted on training tiles (`measured_readings`). A second look from the same height sharpens the map, one
-from below replaces its reading.
+cell of the belief keeps the reading of the finest map that knows it, or a hole where all that scanned it have
+one; how often ground is safe that reads so was counted on training tiles (`measured_readings`). A second look
+from the same height sharpens the map, one from below replaces its reading.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from hda.policies.measured_readings import DENSITY_EDGES, HOLE, PROBABILITY_EDGE
 from hda.safety.criteria import SafetyCriteria
 from hda.sensing.fusion import fuse_elevations
 from hda.sensing.gridding import PIXEL_SIZES, ElevationMap
-from hda.sensing.measured_look import MeasuredGround, assess_elevation
+from hda.sensing.measured_look import MeasuredGround, assess_elevation, find_holes
 
 _UNREAD = -1
 _SCANNED = 0.8  # share of the cells around a site with points, for a hole to be one
@@ -90,8 +90,11 @@ class MeasuredBelief:
         i, j = _inside(rows, ground.grid.rows), _inside(columns, ground.grid.columns)
         there, here = np.ix_(rows[i], columns[j]), np.ix_(i, j)
         old = self.size_class[here]
-        better = (reading[there] != _UNREAD) & ((old == _UNREAD) | (number <= old))
-        better &= (reading[there] != HOLE) | (old == _UNREAD) | (number == old)
+        old_hole = (old != _UNREAD) & (self.probability_class[here] == HOLE)
+        new_hole = reading[there] == HOLE
+        better = (old == _UNREAD) | (number == old) | (old_hole & ~new_hole)
+        better |= (number < old) & (old_hole | ~new_hole)
+        better &= reading[there] != _UNREAD
         sizes, densities, readings = (
             layer.copy() for layer in (self.size_class, self.density_class, self.probability_class)
         )
@@ -124,7 +127,11 @@ def _inside(places: NDArray[np.int64], count: int) -> NDArray[np.int64]:
 def classify_readings(
     ground: MeasuredGround, criteria: SafetyCriteria
 ) -> tuple[NDArray[np.int8], NDArray[np.int8]]:
-    """Class of V_P and of the density of points of every cell; -1 where its ground was not scanned."""
+    """Class of V_P and of the density of points of every cell.
+
+    The class of V_P is -1 where the ground was not scanned, or the lander fits on no map of this size or into
+    one of its cells; it is `HOLE` where most cells around hold points, but one under the lander does not.
+    """
     from scipy.ndimage import uniform_filter
 
     count = ground.elevation.count
@@ -133,10 +140,6 @@ def classify_readings(
     points = uniform_filter(count.astype(np.float32), span, mode="constant")
     density = np.searchsorted(DENSITY_EDGES, points / np.maximum(scanned, 1e-6)).astype(np.int8)
     reading = np.searchsorted(PROBABILITY_EDGES, ground.probability).astype(np.int8)
-    edge = span // 2
-    holed = np.zeros(reading.shape, dtype=np.bool_)
-    holed[edge : reading.shape[0] - edge, edge : reading.shape[1] - edge] = True
-    holed &= (scanned >= _SCANNED) & ~ground.known
     reading[~ground.known] = _UNREAD
-    reading[holed] = HOLE
+    reading[find_holes(ground, criteria) & (scanned >= _SCANNED)] = HOLE
     return reading, density

@@ -28,7 +28,7 @@ from hda.safety.stable_planes import (
     assess_rows,
     assess_rows_on_one_core,
 )
-from hda.safety.uncertain_heights import score_sites
+from hda.safety.uncertain_heights import UncertainGround, score_sites
 
 HIGHEST = 1e9
 """[m] No ground is higher or deeper: such a number is a no-data value that nobody declared."""
@@ -111,7 +111,8 @@ def assess_safety(
     deterministic = (worst.slope <= criteria.max_slope) & (worst.roughness <= criteria.max_roughness)
     if noise is not None:
         probability = np.zeros(elevation.shape)
-        score_sites((elevation, pad_map, noise), cells, limits, criteria.max_slope, worst, probability)
+        ground = UncertainGround(elevation, pad_map, noise)
+        score_sites(ground, cells, limits, criteria.max_slope, worst, probability)
     elif criteria.range_noise == 0.0:
         probability = deterministic.astype(np.float64)
     else:

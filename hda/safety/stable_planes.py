@@ -18,14 +18,49 @@ from guidance.kernel import compile_kernel, compile_parallel_kernel
 COLUMN_BLOCK = 256  # sites of a row worked on together; their buffers stay in the first-level cache
 
 
+class SiteBlock(NamedTuple):
+    """Neighbouring sites of a row: the row, the first site's column, and how many they are."""
+
+    row: int
+    start: int
+    sites: int
+
+
+class PlaneGradients(NamedTuple):
+    """The stable planes a and b of each site of a block: slopes [m per cell], height of the centre [m]."""
+
+    east_a: Array
+    north_a: Array
+    east_b: Array
+    north_b: Array
+    centre: Array
+
+
+class _Heights(NamedTuple):
+    """[m] highest ground above planes a and b of each site of a block: so far, and in one strip."""
+
+    high_a: Array
+    high_b: Array
+    strip_a: Array
+    strip_b: Array
+
+
 @compile_kernel
-def plane_gradients(pad_map, row, start, n, north, east, buffer):
-    """Gradients [m per cell] of the two stable planes and the centre's height, for `n` sites of a row."""
+def make_planes() -> PlaneGradients:
+    """Room for the planes of a block."""
+    room = np.empty((5, COLUMN_BLOCK))
+    return PlaneGradients(room[0], room[1], room[2], room[3], room[4])
+
+
+@compile_kernel
+def fit_planes(pad_map: Array, block: SiteBlock, north: int, east: int, planes: PlaneGradients) -> None:
+    """Fill `planes` with the two stable planes of each site, pad 0 at the offset (north, east) [cells]."""
+    row, start, n = block
+    east_a, north_a, east_b, north_b, centre = planes
     z0 = pad_map[row + north, start + east : start + east + n]
     z1 = pad_map[row + east, start - north : start - north + n]
     z2 = pad_map[row - north, start - east : start - east + n]
     z3 = pad_map[row - east, start + north : start + north + n]
-    east_a, north_a, east_b, north_b, centre = buffer[0], buffer[1], buffer[2], buffer[3], buffer[4]
     squared_radius = float(north * north + east * east)
     for i in range(n):
         first, second = 0.5 * (z0[i] + z2[i]), 0.5 * (z1[i] + z3[i])
@@ -43,10 +78,17 @@ def plane_gradients(pad_map, row, start, n, north, east, buffer):
 
 
 @compile_kernel
-def _highest_ground(elevation, row, start, n, strips, buffer):
+def _find_highest(
+    elevation: Array,
+    block: SiteBlock,
+    strips: NDArray[np.int64],
+    planes: PlaneGradients,
+    heights: _Heights,
+) -> None:
     """Greatest elevation less gradient times offset over the cells between the pads, for both planes."""
-    east_a, north_a, east_b, north_b = buffer[0], buffer[1], buffer[2], buffer[3]
-    high_a, high_b, strip_a, strip_b = buffer[5], buffer[6], buffer[7], buffer[8]
+    row, start, n = block
+    east_a, north_a, east_b, north_b, _ = planes
+    high_a, high_b, strip_a, strip_b = heights
     for i in range(n):
         high_a[i], high_b[i] = -np.inf, -np.inf
     for k in range(strips.shape[0]):
@@ -108,23 +150,19 @@ def _assess_row(
     pixel_size, max_roughness = limits
     slope, roughness, excess = worst
     columns = elevation.shape[1]
-    buffer = np.empty((9, COLUMN_BLOCK))
+    planes, room = make_planes(), np.empty((4, COLUMN_BLOCK))
+    heights = _Heights(room[0], room[1], room[2], room[3])
+    east_a, north_a, east_b, north_b, centre = planes
+    high_a, high_b, _, _ = heights
     for start in range(half_size, columns - half_size, COLUMN_BLOCK):
         n = min(COLUMN_BLOCK, columns - half_size - start)
+        block = SiteBlock(row, start, n)
         steepest, roughest, most = slope[row, start:], roughness[row, start:], excess[row, start:]
         for i in range(n):
             steepest[i], roughest[i], most[i] = 0.0, -np.inf, -np.inf
         for k in range(pads.shape[0]):
-            plane_gradients(pad_map, row, start, n, pads[k, 0], pads[k, 1], buffer)
-            _highest_ground(elevation, row, start, n, strips[first_strip[k] : first_strip[k + 1]], buffer)
-            east_a, north_a, east_b, north_b, centre = (
-                buffer[0],
-                buffer[1],
-                buffer[2],
-                buffer[3],
-                buffer[4],
-            )
-            high_a, high_b = buffer[5], buffer[6]
+            fit_planes(pad_map, block, pads[k, 0], pads[k, 1], planes)
+            _find_highest(elevation, block, strips[first_strip[k] : first_strip[k + 1]], planes, heights)
             for i in range(n):
                 squared_a = (east_a[i] ** 2 + north_a[i] ** 2) / pixel_size**2
                 squared_b = (east_b[i] ** 2 + north_b[i] ** 2) / pixel_size**2

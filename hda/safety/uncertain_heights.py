@@ -3,27 +3,72 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from guidance.arrays import Array
 from guidance.kernel import compile_kernel
 from hda.safety.stable_planes import (
     COLUMN_BLOCK,
     FootprintCells,
+    PlaneGradients,
     RasterLimits,
+    SiteBlock,
     WorstCase,
-    plane_gradients,
+    fit_planes,
+    make_planes,
 )
 
 _LEAST_NOISE = 1e-9  # [m] a smaller error decides like none
 
 
+class UncertainGround(NamedTuple):
+    """Ground whose heights err; (m, n) each.
+
+    Attributes:
+        elevation: [m].
+        pad_map: [m] highest ground under a pad at each cell.
+        noise: [m] one standard deviation of each height.
+    """
+
+    elevation: Array
+    pad_map: Array
+    noise: Array
+
+
+class _Scores(NamedTuple):
+    """Of each site of a block.
+
+    Attributes:
+        limit_a: [m] greatest safe height at the centre, by plane a.
+        limit_b: [m] the same by plane b.
+        floor_a: [m] the same by plane a in the strip at hand, north of the centre or south.
+        floor_b: [m] the same by plane b.
+        worst: greatest height above a limit, in deviations.
+    """
+
+    limit_a: Array
+    limit_b: Array
+    floor_a: Array
+    floor_b: Array
+    worst: Array
+
+
 @compile_kernel
-def _worst_score(elevation, precision, row, start, n, strips, buffer):
-    """Raise buffer[9] to the greatest (height above a plane less its limit) x precision between the pads."""
-    east_a, north_a, east_b, north_b = buffer[0], buffer[1], buffer[2], buffer[3]
-    limit_a, limit_b, floor_a, floor_b, score = buffer[5], buffer[6], buffer[7], buffer[8], buffer[9]
+def _raise_scores(
+    elevation: Array,
+    precision: Array,
+    block: SiteBlock,
+    strips: NDArray[np.int64],
+    planes: PlaneGradients,
+    scores: _Scores,
+) -> None:
+    """Raise `worst` to the greatest (height above a plane less its limit) x precision between the pads."""
+    row, start, n = block
+    east_a, north_a, east_b, north_b, _ = planes
+    limit_a, limit_b, floor_a, floor_b, score = scores
     for k in range(strips.shape[0]):
         north = strips[k, 0]
         for i in range(n):
@@ -41,7 +86,7 @@ def _worst_score(elevation, precision, row, start, n, strips, buffer):
 
 @compile_kernel
 def score_sites(
-    ground: tuple[Array, Array, Array],
+    ground: UncertainGround,
     footprint: FootprintCells,
     limits: RasterLimits,
     max_slope: float,
@@ -51,8 +96,7 @@ def score_sites(
     """Fill `probability`: that of the worst cell, orientation and plane, 0.5 erfc(score / sqrt 2).
 
     Args:
-        ground: (m, n) each: elevation [m], highest ground under a pad at each cell [m], and one standard
-            deviation of each height [m].
+        ground: the heights and their errors, (m, n).
         footprint: the lander.
         limits: side of a cell and greatest roughness.
         max_slope: [rad].
@@ -64,22 +108,25 @@ def score_sites(
     pads, first_strip, strips, half_size = footprint
     rows, columns = elevation.shape
     precision = 1.0 / np.maximum(noise, _LEAST_NOISE)
-    buffer = np.empty((10, COLUMN_BLOCK))
-    limit_a, limit_b, score = buffer[5], buffer[6], buffer[9]
+    planes, room = make_planes(), np.empty((5, COLUMN_BLOCK))
+    east_a, north_a, east_b, north_b, centre = planes
+    scores = _Scores(room[0], room[1], room[2], room[3], room[4])
+    limit_a, limit_b, _, _, score = scores
     for row in range(half_size, rows - half_size):
         for start in range(half_size, columns - half_size, COLUMN_BLOCK):
             n = min(COLUMN_BLOCK, columns - half_size - start)
+            block = SiteBlock(row, start, n)
             for i in range(n):
                 score[i] = -np.inf
             for k in range(pads.shape[0]):
-                plane_gradients(pad_map, row, start, n, pads[k, 0], pads[k, 1], buffer)
+                fit_planes(pad_map, block, pads[k, 0], pads[k, 1], planes)
                 for i in range(n):
-                    square_a = (buffer[0, i] ** 2 + buffer[1, i] ** 2) / limits.pixel_size**2
-                    square_b = (buffer[2, i] ** 2 + buffer[3, i] ** 2) / limits.pixel_size**2
-                    limit_a[i] = buffer[4, i] + limits.max_roughness * math.sqrt(1.0 + square_a)
-                    limit_b[i] = buffer[4, i] + limits.max_roughness * math.sqrt(1.0 + square_b)
+                    square_a = (east_a[i] ** 2 + north_a[i] ** 2) / limits.pixel_size**2
+                    square_b = (east_b[i] ** 2 + north_b[i] ** 2) / limits.pixel_size**2
+                    limit_a[i] = centre[i] + limits.max_roughness * math.sqrt(1.0 + square_a)
+                    limit_b[i] = centre[i] + limits.max_roughness * math.sqrt(1.0 + square_b)
                 own = strips[first_strip[k] : first_strip[k + 1]]
-                _worst_score(elevation, precision, row, start, n, own, buffer)
+                _raise_scores(elevation, precision, block, own, planes, scores)
             for i in range(n):
                 if worst.slope[row, start + i] <= max_slope:  # False for NaN
                     probability[row, start + i] = 0.5 * math.erfc(score[i] / math.sqrt(2.0))

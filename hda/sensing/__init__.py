@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from hda.sensing.fusion import fuse_elevations
     from hda.sensing.gridding import ElevationMap, Gridding, PixelGrid, grid_points, lay_grid
     from hda.sensing.lidar import Lidar, look
-    from hda.sensing.measured_look import MeasuredGround, assess_elevation, measure_ground
+    from hda.sensing.measured_look import MeasuredGround, assess_elevation, find_holes, measure_ground
     from hda.sensing.ranging import PointCloud, RangingLidar, ScanDraws, draw_scan, scan
     from hda.sensing.ray_casting import find_ground
 
@@ -22,7 +22,7 @@ _HOMES = {
     "hda.sensing.fusion": ("fuse_elevations",),
     "hda.sensing.gridding": ("ElevationMap", "Gridding", "PixelGrid", "grid_points", "lay_grid"),
     "hda.sensing.lidar": ("Lidar", "look"),
-    "hda.sensing.measured_look": ("MeasuredGround", "assess_elevation", "measure_ground"),
+    "hda.sensing.measured_look": ("MeasuredGround", "assess_elevation", "find_holes", "measure_ground"),
     "hda.sensing.ranging": ("PointCloud", "RangingLidar", "ScanDraws", "draw_scan", "scan"),
     "hda.sensing.ray_casting": ("find_ground",),
 }
@@ -39,6 +39,7 @@ __all__ = [
     "assess_elevation",
     "draw_scan",
     "find_ground",
+    "find_holes",
     "fuse_elevations",
     "grid_points",
     "lay_grid",

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from guidance.arrays import Array
 from hda.safety.criteria import SafetyCriteria
-from hda.safety.lander_footprint import make_footprint
+from hda.safety.lander_footprint import LanderFootprint, make_footprint
 from hda.safety.safety_map import assess_safety
 from hda.sensing.gridding import ElevationMap, PixelGrid, grid_points, lay_grid
 from hda.sensing.ranging import PointCloud, RangingLidar
@@ -77,14 +77,25 @@ def assess_elevation(elevation: ElevationMap, criteria: SafetyCriteria) -> Measu
     return MeasuredGround(elevation, safety.probability, ~np.isnan(safety.slope))
 
 
+def find_holes(ground: MeasuredGround, criteria: SafetyCriteria) -> NDArray[np.bool_]:
+    """Shape (rows, columns): where the lander fits on the map, but stands over ground without an echo."""
+    holes = np.zeros(ground.grid.shape, dtype=np.bool_)
+    if _lander_fits(ground.grid, criteria):
+        edge = _make_footprint(ground.grid, criteria).half_size
+        inner = np.s_[edge : holes.shape[0] - edge, edge : holes.shape[1] - edge]
+        holes[inner] = ~ground.known[inner]
+    return holes
+
+
 def _lander_fits(grid: PixelGrid, criteria: SafetyCriteria) -> bool:
     """Whether the raster of a grid holds the lander, and tells its pads apart."""
     if grid.pixel_size >= criteria.footprint_diameter:
         return False
-    return (
-        min(grid.shape)
-        >= make_footprint(criteria.footprint_diameter, criteria.pad_diameter, grid.pixel_size).span
-    )
+    return min(grid.shape) >= _make_footprint(grid, criteria).span
+
+
+def _make_footprint(grid: PixelGrid, criteria: SafetyCriteria) -> LanderFootprint:
+    return make_footprint(criteria.footprint_diameter, criteria.pad_diameter, grid.pixel_size)
 
 
 def measure_ground(
@@ -93,7 +104,7 @@ def measure_ground(
     """Grid the points of a scan and assess them.
 
     The cells are sized by the spacing of the rays on the ground that was measured, which lies below the
-    target plane.
+    target plane. From the plane's height or below it nothing is known: the map is empty.
 
     Args:
         cloud: the echoes.
@@ -102,9 +113,13 @@ def measure_ground(
         target: [m] shape (3,), where it believes the centre of the scan to be, on the target plane.
         criteria: of the lander.
     """
-    points = cloud.offset + position
+    height = float(position[2] - target[2])
+    offset, deviation = cloud.offset, cloud.deviation
+    if height <= 0.0:
+        offset, deviation = offset[:0], deviation[:0]
+    points = offset + position
     spacing = lidar.ray_spacing(position, target)
     if len(points):
-        spacing *= float(-cloud.offset[:, 2].mean()) / float(position[2] - target[2])
+        spacing *= float(-offset[:, 2].mean()) / height
     grid = lay_grid(points, lidar.gridding.pixel_size(spacing), lidar.rays)
-    return assess_elevation(grid_points(points, cloud.deviation, grid, lidar.gridding.percentile), criteria)
+    return assess_elevation(grid_points(points, deviation, grid, lidar.gridding.percentile), criteria)

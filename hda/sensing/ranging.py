@@ -27,18 +27,19 @@ class RangingLidar:
     """A scanning LIDAR that gives ranges, and what is made of them on board.
 
     Attributes:
-        rays: along each side of the scan (flash LIDARs of ALHAT's kind: 128).
+        rays: along each side of the scan (128: chosen, of the order of a flash LIDAR's detectors; that of
+            ALHAT is described by Roback et al., 2015, NTRS 20160005928).
         field_of_view: [rad] the scan covers a square of side range x tan(field_of_view) on the target plane
             (the paper's 11.4 deg).
         margin: [m] by which the scan reaches beyond that square on every side, so that Algorithm 1 can judge
             its edge: half a lander and a cell.
         off_nadir_limit: [rad] rays further than this from the vertical are not sent (the paper's 20 deg).
         pixels: along each side of the safety map (the paper's 64).
-        range_noise: [m] one sigma of a range at `noise_range`, growing in proportion to the range (ALHAT: 5
-            cm at three sigma; in proportion, as the echo weakens with the square of the range).
+        range_noise: [m] one sigma of a range at `noise_range`, growing in proportion to the range (the
+            paper's 5 cm at three sigma; in proportion, as the echo weakens with the square of the range).
         noise_range: [m] range to which `range_noise` refers.
         beam_divergence: [rad] full angle of the beam. On ground inclined by i to the beam it adds an error
-            of one sigma (range x beam_divergence / 4) tan i (ALHAT: 1 deg over 128 detectors).
+            of one sigma (range x beam_divergence / 4) tan i (chosen: 1 deg over 128 detectors).
         range_bias: [m] one sigma of an error common to all ranges of a scan (Chang'E-3: under 0.15 m at
             three).
         ray_dropout: probability that a ray brings no echo.
@@ -176,6 +177,14 @@ class _Timing(NamedTuple):
     latency: float
 
 
+class _RayDraws(NamedTuple):
+    """The part of `ScanDraws` that each ray has of its own."""
+
+    range: NDArray[np.float32]
+    jitter: NDArray[np.float32]
+    dropout: NDArray[np.float32]
+
+
 class _Echoes(NamedTuple):
     """Where the kernel writes: `PointCloud` with a place for every ray."""
 
@@ -189,7 +198,7 @@ def _scan_into(
     view: _View,
     errors: _Errors,
     timing: _Timing,
-    draws: tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]],
+    draws: _RayDraws,
     echoes: _Echoes,
 ) -> int:
     """Send every ray; return the number of echoes written."""
@@ -275,7 +284,7 @@ def scan(
             lidar.ray_dropout,
         ),
         _Timing(lidar.scan_duration, lidar.latency),
-        (draws.range, draws.jitter, draws.dropout),
+        _RayDraws(draws.range, draws.jitter, draws.dropout),
         _Echoes(offset, deviation),
     )
     return PointCloud(offset[:count], deviation[:count])

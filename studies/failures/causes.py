@@ -1,12 +1,17 @@
 """Why an episode failed, computed from its record and the true map.
 
 A landing on hazardous ground is followed back: was the site itself safe, had a look shown truly safe
-ground, was some of it within reach at that look (the outer bound of
-`hda.policies.privileged.knowable_ground`, so `out of reach` is proved), and what did the last look that
-read the site say of it? Beside the cause stand the single changes that would have made the episode a
-success: the same episode flown again with a noiseless map (or with twice the rays, where the sensor gives
-ranges), an exact engine, or exact navigation. Where no
-safe ground had been seen such a success is another draw of luck.
+ground, was some of it within reach at that look, and what did the last look that read the site say of it?
+
+Of the cells counted as seen, those out of reach are proved to be: that rests on fact 1 of
+`hda.policies.privileged.knowable_ground` alone, which holds whatever the sensor. Seen are the pixels of the
+safety map. Where the sensor gives ranges, the elevation map reaches some metres past them, so that a policy
+that reads it may know more ground than is counted here.
+
+Beside the cause stand the single changes that would have made the episode a success: the same episode flown
+again with a noiseless map (or with twice the rays, where the sensor gives ranges), an exact engine, or exact
+navigation. Twice the rays have other noise: the errors common to a scan stay, those of each ray are drawn
+anew, so that such a success may be luck. So it is where no safe ground had been seen.
 """
 
 from __future__ import annotations
@@ -235,7 +240,8 @@ def find_remedies(study: Study, policy: str, record: EpisodeRecord) -> tuple[str
     if isinstance(preset.lidar, Lidar) and preset.lidar.noise > 0.0:
         changes["noiseless map"] = replace(preset, lidar=replace(preset.lidar, noise=0.0))
     if isinstance(preset.lidar, RangingLidar):
-        changes["twice the rays"] = replace(preset, lidar=replace(preset.lidar, rays=2 * preset.lidar.rays))
+        doubled = replace(preset.lidar, rays=2 * preset.lidar.rays)
+        changes["twice the rays (each with other noise)"] = replace(preset, lidar=doubled)
     if rules.thrust_error > 0.0:
         changes["exact engine"] = replace(preset, rules=replace(rules, thrust_error=0.0))
     if rules.navigation_position_error > 0.0 or rules.navigation_velocity_error > 0.0:

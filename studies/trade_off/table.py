@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -10,6 +11,8 @@ from rich.console import Console
 from studies.campaign.score import PROPELLANT_COLUMN, RATIO_COLUMNS, Score, scaled
 from studies.columns import Column, Output, console_table
 from studies.statistics.ratios import Interval
+
+_NO_CEILING = Interval(math.nan, math.nan, math.nan)  # an empty cell
 
 
 @dataclass(frozen=True)
@@ -44,14 +47,19 @@ class Bounds:
     Attributes:
         preset: name.
         episodes: number of episodes.
-        ceiling: ratio of episodes in which safe ground could have been known, with Wilson's interval.
+        ceiling: ratio of episodes in which safe ground could have been known, with Wilson's interval;
+            None where the sensor measures ranges, as the proof does not hold there.
         floor: mean least propellant [%] with Student's interval.
     """
 
     preset: str
     episodes: int
-    ceiling: Interval
+    ceiling: Interval | None
     floor: Interval
+
+
+def _ceiling_percent(bounds: Bounds) -> Interval:
+    return _NO_CEILING if bounds.ceiling is None else scaled(bounds.ceiling, 100.0)
 
 
 def _mark(row: TradeOffRow) -> str:
@@ -74,7 +82,7 @@ COLUMNS: tuple[Column[TradeOffRow], ...] = (
 BOUNDS_COLUMNS: tuple[Column[Bounds], ...] = (
     Column("preset", "preset", lambda bounds: bounds.preset),
     Column("episodes", "episodes", lambda bounds: bounds.episodes),
-    Column("ceiling_percent", "ceiling", lambda bounds: scaled(bounds.ceiling, 100.0), interval=True),
+    Column("ceiling_percent", "ceiling", _ceiling_percent, interval=True),
     Column("floor_percent", "floor", lambda bounds: bounds.floor, interval=True),
 )
 """Ceilings and floors in percent, as bounds.csv has them."""
@@ -86,8 +94,16 @@ def print_trade_off(rows: Sequence[TradeOffRow], bounds: Sequence[Bounds]) -> No
     console = Console(width=max(Console().width, 130))
     console.print(table)
     for b in bounds:
-        console.print(
-            f"{b.preset}: safe ground could have been known in {100.0 * b.ceiling.estimate:.1f} % of"
-            f" {b.episodes} episodes; no soft landing there on less than {b.floor.estimate:.1f} % (mean)",
-            highlight=False,
+        console.print(describe_bounds(b), highlight=False)
+
+
+def describe_bounds(bounds: Bounds) -> str:
+    """The ceiling, or why there is none, and the floor in a sentence."""
+    floor = f"less than {bounds.floor.estimate:.1f} % (mean)"
+    if bounds.ceiling is None:
+        return (
+            f"{bounds.preset}: no ceiling, as a sensor that measures ranges sees ground past the square of"
+            f" its look; no soft landing on safe ground on {floor}, over {bounds.episodes} episodes"
         )
+    known = f"safe ground could have been known in {100.0 * bounds.ceiling.estimate:.1f} %"
+    return f"{bounds.preset}: {known} of {bounds.episodes} episodes; no soft landing there on {floor}"

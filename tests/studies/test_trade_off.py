@@ -16,11 +16,13 @@ from hda.flight.episode_row import MEASURES
 from hda.policies.hazard_aware import HazardAwareSite
 from hda.policies.site_price import HazardAwareWeights
 from hda.registry import make_policy
+from hda.task.presets import find_preset
 from hda.task.scenario import sample_scenario
 from studies.campaign.score import Score
+from studies.columns import write_csv
 from studies.statistics.ratios import Interval
-from studies.trade_off.command import TradeOff, find_front, plan_points, run_trade_off
-from studies.trade_off.table import TradeOffRow
+from studies.trade_off.command import TradeOff, bound_preset, find_front, plan_points, run_trade_off
+from studies.trade_off.table import BOUNDS_COLUMNS, TradeOffRow, describe_bounds
 from studies.trade_off.weights import SWEEP, change_weight, sweep_name, sweep_path
 
 
@@ -137,6 +139,22 @@ def test_no_policy_beats_the_bounds(out: Path) -> None:
         flown = [line for line in csv.DictReader(stream) if line["split"] == "validation"]
     assert all(float(line["success_percent"]) <= float(bounds["ceiling_percent"]) for line in flown)
     assert all(float(line["propellant_percent"]) >= float(bounds["floor_percent"]) for line in flown)
+
+
+@pytest.mark.parametrize(("preset", "bounded"), [("paper", True), ("lidar", False)])
+def test_a_preset_that_measures_ranges_has_a_floor_and_says_why_no_ceiling(
+    preset: str, bounded: bool, tmp_path: Path
+) -> None:
+    bounds = bound_preset(find_preset(preset), TradeOff(episodes=2))
+    assert (bounds.ceiling is not None) == bounded
+    assert bounds.episodes == 2
+    assert 20.0 < bounds.floor.estimate < 60.0
+    assert ("no ceiling, as a sensor that measures ranges" in describe_bounds(bounds)) == (not bounded)
+    write_csv(tmp_path / "bounds.csv", BOUNDS_COLUMNS, [bounds])
+    with (tmp_path / "bounds.csv").open() as stream:
+        (line,) = csv.DictReader(stream)
+    assert (line["ceiling_percent"] == "") == (not bounded)
+    assert float(line["floor_percent"]) == pytest.approx(bounds.floor.estimate)
 
 
 def test_the_picture_is_there(out: Path) -> None:

@@ -1,4 +1,8 @@
-"""The cheapest safe site that a flight could have known, in hindsight."""
+"""The cheapest safe site that a flight could have known, in hindsight.
+
+On presets that measure ranges a policy may know ground outside the set (`knowable_ground`), so there it is
+one privileged policy among others and bounds none.
+"""
 
 from __future__ import annotations
 

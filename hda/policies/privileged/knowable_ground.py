@@ -16,7 +16,8 @@ looks before it lands can do better than its best truly safe cell. It is an oute
    must hold for some look and some p in the cone above s. It is convex in p.
 
 Sight is that of a look at the target plane. A ranging LIDAR sees the ground below it, and so some metres
-past the square and the cone: on presets that measure ranges fact 2, and what follows from it, is no bound.
+past the square and the cone: on presets that measure ranges fact 2, and what follows from it, is no bound,
+and `could_have_landed` refuses them. Fact 1, and so `within_reach` and `least_propellant`, holds there too.
 
 Not ruled out is luck: a policy may land, unseeing, on safe ground outside the set within reach, or crash on
 it. The times of flight and p are searched on a grid refined by golden sections, with `_ALLOWANCE` to spare.
@@ -35,6 +36,7 @@ from guidance.arrays import Array
 from guidance.golden_section import divide, keep_lower, keep_upper
 from guidance.kernel import compile_kernel
 from guidance.state import State
+from hda.sensing.ranging import RangingLidar
 from hda.site_selection import Site
 from hda.task.observation import ScenarioView
 from hda.task.scenario import Scenario, ground_point
@@ -270,7 +272,17 @@ def first_ground(scenario: Scenario) -> KnowableGround:
 
 
 def could_have_landed(scenario: Scenario) -> bool:
-    """Whether the episode's knowable ground holds truly safe ground: the ceiling of any policy that looks."""
+    """Whether the episode's knowable ground holds truly safe ground: the ceiling of any policy that looks.
+
+    Raises:
+        ValueError: the sensor measures ranges, so that the set is no bound.
+    """
+    if isinstance(scenario.preset.lidar, RangingLidar):
+        raise ValueError(
+            "scenario must be of a preset whose sensor gives the safety map; that of"
+            f" {scenario.preset.name!r} measures ranges and sees ground past the square of the look, so"
+            " knowable ground bounds nothing"
+        )
     return nearest_known_site(first_ground(scenario), scenario.tile.deterministic) is not None
 
 

@@ -11,6 +11,7 @@ from guidance.two_impulse import divert_cost
 from hda.ground.tile import Tile
 from hda.policies.hazard_aware import load_kernels
 from hda.policies.privileged.oracle import safe_clearance
+from hda.sensing.ranging import RangingLidar
 from hda.site_selection import Site
 from hda.task.observation import Observation, ScenarioView
 from hda.task.scenario import Scenario
@@ -75,7 +76,7 @@ class CheapestSafeSite:
 
     def begin(self, view: ScenarioView) -> tuple[ScenarioView, Site | None]:
         """No site yet; the map of clearances is made here, once per tile."""
-        load_kernels()
+        load_kernels(ranging=isinstance(view.lidar, RangingLidar))
         safe_clearance(self.truth)
         return view, None
 

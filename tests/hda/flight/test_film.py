@@ -9,6 +9,7 @@ from PIL import Image
 import hda
 from hda.flight.episode import fly
 from hda.flight.film import (
+    FilmedEpisode,
     FilmOptions,
     film_flight,
     film_frames,
@@ -43,7 +44,7 @@ def test_the_command_films_an_agent_and_keeps_under_its_size(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "agent.gif"
-    film_flight("td3", "hard", 3, out=out, film=FilmOptions(step=5.0, width=400))
+    film_flight("td3", FilmedEpisode("hard", 3), out=out, film=FilmOptions(step=5.0, width=400))
     assert "td3 " in capsys.readouterr().out
     assert 1000 < out.stat().st_size < 1_500_000
 

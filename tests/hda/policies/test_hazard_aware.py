@@ -1,6 +1,8 @@
 """The hazard-aware objective: what it must prefer, against slow sums, and what it does in flight."""
 
 import math
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -211,3 +213,39 @@ def test_the_floor_is_the_cheapest_clear_cell():
         if safe[max(row - 3, 0) : row + 4, max(column - 3, 0) : column + 4].sum() == 49:
             assert cost(float(column) + 0.5, float(row) + 0.5) >= cost(site[0], site[1]) - 1e-9
     assert all(np.array_equal(decision.site, site) for decision in record.decisions)
+
+
+FIRST_DECISION = """
+import sys
+from numba.core.dispatcher import Dispatcher
+import hda
+from hda.flight.episode import begin_flight, observe
+from hda.policies.hazard_aware import HazardAwareSite
+
+def loaded():
+    own = [vars(m) for name, m in list(sys.modules.items()) if name.partition(".")[0] in ("hda", "guidance")]
+    kernels = {id(k): k for names in own for k in list(names.values()) if isinstance(k, Dispatcher)}
+    return sum(len(k.signatures) for k in kernels.values()), set(sys.modules)
+
+scenario = hda.sample_scenario("PRESET", 0, 0)
+look = observe(scenario, begin_flight(scenario))
+before = loaded()
+memory = HazardAwareSite().begin(scenario.view)
+ready = loaded()
+HazardAwareSite().select(look, memory)
+after = loaded()
+print(ready[0] - before[0], after[0] - ready[0], sorted(after[1] - ready[1]))
+"""
+
+
+@pytest.mark.parametrize("preset", ["paper", "lidar"])
+def test_the_first_decision_waits_for_no_compiled_code(preset: str) -> None:
+    answer = subprocess.run(
+        [sys.executable, "-c", FIRST_DECISION.replace("PRESET", preset)],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    begun, late, modules = answer.stdout.split(maxsplit=2)
+    assert int(begun) > 0
+    assert (int(late), modules.strip()) == (0, "[]")

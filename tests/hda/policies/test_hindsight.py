@@ -191,3 +191,18 @@ def test_a_tank_that_cannot_stop_the_fall_knows_nothing() -> None:
     scenario = sample_scenario("paper", 0, 0)
     poor = State(scenario.initial_state.position, scenario.initial_state.velocity, 1160.0)
     assert not could_have_landed(replace(scenario, initial_state=poor))
+
+
+@pytest.mark.parametrize("preset", ["lidar", "lidar-coarse"])
+def test_where_ranges_are_measured_there_is_no_ceiling_but_a_floor(preset: str) -> None:
+    with pytest.raises(ValueError, match="measures ranges"):
+        could_have_landed(sample_scenario(preset, 0, 0))
+    pilot, landed = make_policy("nearest-safe"), 0
+    for episode in range(8):
+        scenario = sample_scenario(preset, 0, episode)
+        outcome = fly(pilot, scenario).outcome
+        if outcome.success:
+            landed += 1
+            assert first_ground(scenario).within_reach(outcome.touchdown)
+            assert outcome.propellant_fraction >= least_propellant(scenario) > 0.2
+    assert landed, "nothing was tried: no flight landed"

@@ -9,7 +9,7 @@ from guidance.state import State
 from hda.safety.criteria import SafetyCriteria
 from hda.safety.safety_map import assess_safety
 from hda.sensing.gridding import ElevationMap, PixelGrid
-from hda.sensing.measured_look import MeasuredGround, assess_elevation, measure_ground
+from hda.sensing.measured_look import MeasuredGround, assess_elevation, find_holes, measure_ground
 from hda.sensing.ranging import RangingLidar, draw_scan, scan
 
 PLANE = 50.0
@@ -75,6 +75,37 @@ def test_the_verdict_is_that_of_algorithm_1_on_the_elevation_map():
     expected = assess_safety(height, 1.25, range_noise=spread)
     np.testing.assert_array_equal(ground.probability, expected.probability)
     np.testing.assert_array_equal(ground.known, ~np.isnan(expected.slope))
+
+
+def test_a_hole_is_where_the_lander_fits_and_one_of_its_cells_has_no_echo():
+    height = np.zeros((30, 40))
+    height[15, 20] = np.nan
+    count = np.where(np.isnan(height), 0, 1).astype(np.int32)
+    elevation = ElevationMap(PixelGrid(0, 0, 1.0, 30, 40), height, np.where(count, 0.01, np.nan), count)
+    ground = assess_elevation(elevation, CRITERIA)
+    holes = find_holes(ground, CRITERIA)
+    fits = np.zeros(holes.shape, dtype=bool)
+    fits[5:-5, 5:-5] = True
+    np.testing.assert_array_equal(holes | ground.known, fits)
+    assert not (holes & ground.known).any()
+    rows, columns = np.nonzero(holes)
+    assert max(np.abs(rows - 15).max(), np.abs(columns - 20).max()) == 5
+
+
+@pytest.mark.parametrize("height", [0.0, -0.5])
+def test_from_the_planes_height_or_below_it_nothing_is_known(height: float):
+    lidar = RangingLidar()
+    cloud = scan(
+        lidar,
+        FLAT - np.float32(20.0),
+        State(TARGET + np.array([0.0, 0.0, height]), np.array([0.0, 0.0, -5.0]), 1200.0),
+        TARGET,
+        draw_scan(np.random.default_rng(0), lidar.rays),
+    )
+    assert len(cloud.offset) > 100  # sent before the decision, from above the plane
+    ground = measure_ground(cloud, lidar, TARGET + np.array([0.0, 0.0, height]), TARGET, CRITERIA)
+    assert ground.grid.shape == (0, 0)
+    assert not ground.known_map(TARGET, 20.0, 8).any()
 
 
 @pytest.mark.parametrize(("cells", "known"), [(10, 0), (11, 1), (12, 4)])

@@ -252,6 +252,15 @@ def test_a_sensor_that_cannot_exist_is_refused(changes, message: str):
         RangingLidar(**changes)
 
 
+def test_more_rays_have_noise_of_their_own_but_the_errors_common_to_a_scan_stay():
+    few, many = (EpisodeStreams(0, 3).scan(2, rays) for rays in (32, 64))
+    assert few.attitude.tolist() == many.attitude.tolist()
+    assert (few.bias, few.motion.tolist()) == (many.bias, many.motion.tolist())
+    for name in ("jitter", "dropout"):
+        shared = np.isin(getattr(few, name), getattr(many, name)).mean()
+        assert shared < 0.01, name
+
+
 def test_draws_of_another_scan_are_refused():
     with pytest.raises(ValueError, match="draws must be of 24 x 24 rays"):
         scan(EXACT, FLAT, above(300.0), TARGET, draw_scan(np.random.default_rng(0), 8))
