@@ -15,9 +15,8 @@ looks before it lands can do better than its best truly safe cell. It is an oute
    |(p - r)/t_1 - v - g t_1/2| + |(s - p)/t_2 - (p - r)/t_1 - g T/2| + |(s - p)/t_2 + g t_2/2| <= D + w_s
    must hold for some look and some p in the cone above s. It is convex in p.
 
-Sight is that of a look at the target plane. A ranging LIDAR sees the ground below it, and so some metres
-past the square and the cone: on presets that measure ranges fact 2, and what follows from it, is no bound,
-and `could_have_landed` refuses them. Fact 1, and so `within_reach` and `least_propellant`, holds there too.
+Sight is that of a look at the target plane. A ranging LIDAR sees the ground below it, some metres past the
+square and the cone: there fact 2 and what needs it are no bound, fact 1 (`least_propellant`) holds as ever.
 
 Not ruled out is luck: a policy may land, unseeing, on safe ground outside the set within reach, or crash on
 it. The times of flight and p are searched on a grid refined by golden sections, with `_ALLOWANCE` to spare.
@@ -277,12 +276,9 @@ def could_have_landed(scenario: Scenario) -> bool:
     Raises:
         ValueError: the sensor measures ranges, so that the set is no bound.
     """
-    if isinstance(scenario.preset.lidar, RangingLidar):
-        raise ValueError(
-            "scenario must be of a preset whose sensor gives the safety map; that of"
-            f" {scenario.preset.name!r} measures ranges and sees ground past the square of the look, so"
-            " knowable ground bounds nothing"
-        )
+    preset = scenario.preset
+    if isinstance(preset.lidar, RangingLidar):
+        raise ValueError(f"preset must not measure ranges, by which looks see too far; {preset.name!r} does")
     return nearest_known_site(first_ground(scenario), scenario.tile.deterministic) is not None
 
 
@@ -296,8 +292,7 @@ def least_propellant(scenario: Scenario) -> float:
     if row.size == 0:
         return math.inf
     sites = np.column_stack([column + 0.5, row + 0.5, np.full(row.size, ground.target[2])])
-    state, view = ground.state, ground.view
-    gravity = -float(view.gravity[2])
+    state, view, gravity = ground.state, ground.view, -float(ground.view.gravity[2])
     longest = (ground.budget + float(np.linalg.norm(state.velocity))) / gravity
     cost = _least_two_impulses(sites - state.position, state.velocity, gravity, longest)
     spared = math.sqrt(2.0) * ground.soft_speed + _ALLOWANCE
