@@ -43,6 +43,7 @@ ALLOWED: dict[tuple[str, str], str] = {
     ("hda/registry.py", "importlib.import_module"): "the policy that the user names: package.module:Name",
     ("hda/registry.py", ".load() of an entry point"): "policies of installed packages",
     ("studies/launcher.py", "importlib.import_module"): "commands of these packages, by fixed names",
+    ("hda/flight/film.py", "importlib.import_module"): "the agents, by a fixed name, as an entry point would",
     ("studies/timing/gfold_peer.py", "importlib.import_module"): "an optional peer, by a fixed name",
     ("studies/timing/openscvx_worker.py", "importlib.import_module"): "an optional peer, by a fixed name",
     ("studies/timing/qoco_peer.py", "importlib.import_module"): "an optional peer, by a fixed name",
