@@ -3,7 +3,8 @@
 A tile's number is its seed. The splits never mix: training ground, ground to tune on, ground to evaluate on,
 and fresh ground for reliability runs. Every parameter of the terrain and of its assessment, and the format
 version, go into the cache key, so a change of any of them builds anew. A terrain of a user's own
-(`hda.ground.own_terrain`) is kept here too, under the hash of its file; its split is `own`.
+(`hda.ground.own_terrain`) is kept here too, under the hash of its file; its split is `own`. Fresh tiles are
+many and each is flown over once: they are built in memory and dropped.
 """
 
 from __future__ import annotations
@@ -35,10 +36,13 @@ SPLITS: dict[str, range] = {
     "train": range(70),
     "tuning": range(2000, 2060),
     "validation": range(1000, 1018),
-    "fresh": range(10_000, 10_400),
+    "fresh": range(10_000, 15_000),
 }
 """Tile numbers: `train` for learning, `tuning` for every choice, `validation` and `fresh` for evaluation
 only."""
+
+FRESH_SPLIT = "fresh"
+"""Episode k of a study flies over the k-th of its tiles, so that up to 5000 episodes are independent."""
 
 _LAYERS = {"elevation": np.float32, "probability": np.float32, "deterministic": np.bool_}
 _verified: set[Path] = set()
@@ -104,15 +108,17 @@ def build_tile(ground: Ground, number: int) -> Tile:
 def load_tile(ground: Ground, number: int, split: str) -> Tile:
     """Give one tile, memory-mapped from the cache; it is built, or built anew if corrupt, on demand.
 
+    A fresh tile is built in memory and leaves nothing on the disk.
+
     Raises:
         ValueError: the tile does not belong to the split.
     """
     check_split(number, split, ground)
-    return _open_or_build(ground, number)
+    return _build_in_memory(ground, number) if split == FRESH_SPLIT else _open_or_build(ground, number)
 
 
 def prepare_tiles(ground: Ground, split: str, workers: int = 2, numbers: Iterable[int] | None = None) -> None:
-    """Build the missing tiles of a split in parallel, with a progress bar.
+    """Build the missing tiles of a split in parallel, with a progress bar; nothing for fresh ones.
 
     Args:
         ground: generator's and assessment's parameters.
@@ -127,7 +133,7 @@ def prepare_tiles(ground: Ground, split: str, workers: int = 2, numbers: Iterabl
     for number in wanted:
         check_split(number, split, ground)
     missing = [number for number in wanted if not _tile_folder(ground, number).exists()]
-    if not missing:
+    if not missing or split == FRESH_SPLIT:
         return
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns) as progress:
@@ -144,6 +150,7 @@ def prepare_tiles(ground: Ground, split: str, workers: int = 2, numbers: Iterabl
 def remove_tiles(ground: Ground) -> None:
     """Remove every cached tile of a ground; they are built again on demand."""
     _open_or_build.cache_clear()
+    _build_in_memory.cache_clear()
     _verified.clear()
     shutil.rmtree(ground.folder(), ignore_errors=True)
 
@@ -160,6 +167,11 @@ def _tile_folder(ground: Ground, number: int) -> Path:
 
 def _prepare(ground: Ground, number: int) -> None:
     _open_or_build(ground, number)
+
+
+@lru_cache(maxsize=2)
+def _build_in_memory(ground: Ground, number: int) -> Tile:
+    return build_tile(ground, number)
 
 
 @lru_cache(maxsize=96)

@@ -10,7 +10,7 @@ import numpy as np
 
 from guidance.arrays import Array
 from guidance.state import State
-from hda.ground.library import Ground, load_tile, tile_numbers
+from hda.ground.library import FRESH_SPLIT, Ground, load_tile, tile_numbers
 from hda.ground.tile import Tile
 from hda.task.observation import ScenarioView
 from hda.task.presets import Preset, find_preset
@@ -125,12 +125,15 @@ def draw_scenario(
     Args:
         preset: the setting.
         streams: the episode's random streams; only the scenario stream is used here.
-        split: name of the split that the tiles are from, for the record.
+        split: name of the split that the tiles are from; on `fresh` the episode's number chooses the tile.
         tile_numbers: at least one.
         load: gives the tile of a number.
     """
     rng = streams.scenario()
-    tile = load(tile_numbers[int(rng.integers(len(tile_numbers)))])
+    drawn = int(rng.integers(len(tile_numbers)))
+    if split == FRESH_SPLIT:  # each episode has ground of its own
+        drawn = streams.episode % len(tile_numbers)
+    tile = load(tile_numbers[drawn])
     plane = preset.terrain.maximum_elevation
     target = draw_target(tile, preset.start, plane, rng)
     target.flags.writeable = False

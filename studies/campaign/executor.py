@@ -42,7 +42,7 @@ def local_processes(workers: int) -> Iterator[Executor | None]:
     if workers == 1:
         yield None
         return
-    pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_end_with_parent)
+    pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_begin_worker)
     try:
         yield pool
     finally:
@@ -55,6 +55,14 @@ def advise_script() -> str:
     if getattr(main, "__spec__", None) is not None or not hasattr(main, "__file__"):
         return ""
     return '; a script must call for a study under `if __name__ == "__main__":`, since every worker reads it'
+
+
+def _begin_worker() -> None:
+    """One thread, since its siblings keep the other cores busy, and no life beyond the parent's."""
+    import numba
+
+    numba.set_num_threads(1)
+    _end_with_parent()
 
 
 def _end_with_parent() -> None:

@@ -18,7 +18,7 @@ from studies.statistics.moments import TileMoments, mean_intervals
 from studies.statistics.ratios import Interval, clustered_count_interval, wilson_interval
 from studies.statistics.reliability import exact_lower_bound
 
-AT_LEAST_CONFIDENCE = 0.9
+AT_LEAST_CONFIDENCE = 0.95
 """Confidence of "success in at least x %", as requirements of guidance are verified."""
 
 
@@ -32,7 +32,10 @@ class Score:
         safe_site_by_tile: the same ratio with the interval clustered by tile.
         success: ratio of successes with Wilson's interval.
         success_by_tile: the same ratio with the interval clustered by tile.
-        success_at_least: exact one-sided lower bound of `success` at AT_LEAST_CONFIDENCE.
+        success_at_least: exact one-sided lower bound of `success` at AT_LEAST_CONFIDENCE, were all episodes
+            independent.
+        success_at_least_by_tile: the same bound of the share of tiles on which every episode succeeds. Tiles
+            are independent, and an episode succeeds at least as often as all those of its tile do.
         means: measure -> mean with Student's interval.
         means_by_tile: measure -> the same mean with the interval clustered by tile.
         fallbacks: decisions in which the policy's own law gave no answer.
@@ -44,6 +47,7 @@ class Score:
     success: Interval
     success_by_tile: Interval
     success_at_least: float
+    success_at_least_by_tile: float
     means: dict[str, Interval]
     means_by_tile: dict[str, Interval]
     fallbacks: int
@@ -100,14 +104,16 @@ class RunningScore:
             by_tile[name] = clustered_count_interval(successes, flown)
         moments = self.means.collect()
         means = {name: mean_intervals(moments, k) for k, name in enumerate(MEASURES)}
-        successes = int(self.count_successes("success")[0].sum())
+        successes, flown = self.count_successes("success")
+        faultless = int(np.count_nonzero(successes == flown))
         return Score(
             episodes=self.episodes,
             safe_site=plain["safe_site"],
             safe_site_by_tile=by_tile["safe_site"],
             success=plain["success"],
             success_by_tile=by_tile["success"],
-            success_at_least=exact_lower_bound(successes, self.episodes, AT_LEAST_CONFIDENCE),
+            success_at_least=exact_lower_bound(int(successes.sum()), self.episodes, AT_LEAST_CONFIDENCE),
+            success_at_least_by_tile=exact_lower_bound(faultless, flown.size, AT_LEAST_CONFIDENCE),
             means={name: student for name, (student, _) in means.items()},
             means_by_tile={name: tiled for name, (_, tiled) in means.items()},
             fallbacks=self.fallbacks,
@@ -174,6 +180,16 @@ AT_LEAST_COLUMN: Column[Score] = Column(
     digits=2,
     unit="%",
     label=f"success at least (at {AT_LEAST_CONFIDENCE:.0%})",
+    late=True,
+)
+
+AT_LEAST_BY_TILE_COLUMN: Column[Score] = Column(
+    "success_at_least_by_tile",
+    "by tile",
+    lambda score: 100.0 * score.success_at_least_by_tile,
+    digits=2,
+    unit="%",
+    label=f"success at least, over independent tiles (at {AT_LEAST_CONFIDENCE:.0%})",
     late=True,
 )
 

@@ -158,6 +158,7 @@ def point(name: str, safe: float, burnt: float, **kind: Any) -> TradeOffRow:
         success=ratio,
         success_by_tile=by_tile,
         success_at_least=safe,
+        success_at_least_by_tile=safe,
         means=means,
         means_by_tile=means,
         fallbacks=0,

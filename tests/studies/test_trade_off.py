@@ -42,6 +42,7 @@ def row(name: str, safe: float, burnt: float, privileged: bool = False) -> Trade
         success=ratio,
         success_by_tile=ratio,
         success_at_least=safe,
+        success_at_least_by_tile=safe,
         means=means,
         means_by_tile=means,
         fallbacks=0,

@@ -89,7 +89,7 @@ def test_the_splits_never_meet_and_have_their_sizes():
     assert SPLITS["train"] == range(70)
     assert SPLITS["tuning"] == range(2000, 2060)
     assert SPLITS["validation"] == range(1000, 1018)
-    assert min(SPLITS["fresh"]) == 10_000
+    assert SPLITS["fresh"] == range(10_000, 15_000)
 
 
 @pytest.mark.parametrize(
@@ -129,6 +129,14 @@ def test_an_unknown_split_is_named():
         ValueError, match=r"^split must be one of train, tuning, validation, fresh, got 'test'"
     ):
         tile_numbers("test")
+
+
+def test_a_fresh_tile_is_built_in_memory_and_leaves_nothing_on_the_disk():
+    prepare_tiles(SMALL, "fresh", 1, [10_000])
+    tile = load_tile(SMALL, 10_000, "fresh")
+    assert np.array_equal(tile.elevation, build_tile(SMALL, 10_000).elevation)
+    assert load_tile(SMALL, 10_000, "fresh") is tile  # for the next policy of the same episode
+    assert not SMALL.folder().exists()
 
 
 # What is kept

@@ -313,3 +313,15 @@ def test_the_plane_is_the_terrains_greatest_height():
 def test_a_start_that_means_nothing_is_named(name, start):
     with pytest.raises(ValueError, match=name):
         start()
+
+
+@given(episode=st.integers(0, 12_000), seed=st.integers(0, 100))
+def test_each_fresh_episode_has_ground_of_its_own(episode: int, seed: int) -> None:
+    def load(number: int) -> Tile:
+        return hazardous_tile(number)
+
+    numbers = SPLITS["fresh"]
+    scenario = draw_scenario(PAPER, EpisodeStreams(seed, episode), "fresh", numbers, load)
+    assert scenario.tile.number == 10_000 + episode % 5000
+    other = draw_scenario(PAPER, EpisodeStreams(seed, episode), "train", numbers, load)
+    assert same(scenario.initial_state, other.initial_state)  # the other draws are what they were

@@ -1,18 +1,20 @@
 """The table is a pure function of rows, and its bytes are a pure function of its summaries."""
 
 import csv
+import io
 from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 import pytest
+import rich.console
 from pyarrow.parquet import read_table
 
 from hda.flight.episode_row import MEASURES, EpisodeRow
 from studies.campaign.episode_files import write_episodes
 from studies.campaign.monte_carlo import Chunk
 from studies.compare.scores import score_study
-from studies.compare.table import PolicySummary, summarize_policy, write_table
+from studies.compare.table import PolicySummary, print_table, summarize_policy, write_table
 from studies.statistics.ratios import clustered_interval, mcnemar_p_value, wilson_interval
 from studies.statistics.reliability import exact_lower_bound
 
@@ -73,7 +75,8 @@ def test_ratios_and_test_are_those_of_the_rows(summaries: list[PolicySummary]) -
     assert summaries[1].success.estimate == np.mean(second & (np.arange(60) % 3 != 0))
     assert summaries[1].fallbacks == 30
     successes = int((second & (np.arange(60) % 3 != 0)).sum())
-    assert summaries[1].success_at_least == exact_lower_bound(successes, 60, 0.9)
+    assert summaries[1].success_at_least == exact_lower_bound(successes, 60, 0.95)
+    assert summaries[1].success_at_least_by_tile == exact_lower_bound(0, 4, 0.95)  # each tile saw a failure
 
 
 def test_means_are_those_of_the_rows(summaries: list[PolicySummary]) -> None:
@@ -134,3 +137,21 @@ def test_unequal_episodes_are_refused() -> None:
     moved = [replace(row, episode=row.episode + 1) for row in make_rows("single-divert", np.ones(10))]
     with pytest.raises(ValueError, match="same episodes"):
         score_study(("other",), "single-divert", chunks_of({"other": rows, "single-divert": moved}, 5))
+
+
+@pytest.mark.parametrize("width", [80, 100, 240])
+def test_no_number_is_cut_off_on_a_terminal_of_any_width(
+    summaries: list[PolicySummary], monkeypatch: pytest.MonkeyPatch, width: int
+) -> None:
+    screen = io.StringIO()
+    made = rich.console.Console
+
+    def open_console(width: int = width) -> rich.console.Console:
+        return made(file=screen, force_terminal=True, width=width)
+
+    monkeypatch.setattr(rich.console, "Console", open_console)
+    print_table(summaries)
+    shown = screen.getvalue()
+    assert "…" not in shown
+    assert ("slant" in shown) == (width == 240)
+    assert f"{100.0 * summaries[1].success_at_least_by_tile:.2f}" in shown
