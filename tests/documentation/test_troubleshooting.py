@@ -1,5 +1,6 @@
-"""Every message that the page on troubleshooting shows is one that the software can give."""
+"""The page on troubleshooting shows messages that the software can give, and each that it raises has a form there."""
 
+import ast
 import re
 from pathlib import Path
 
@@ -11,12 +12,15 @@ SOURCES = [
     path for package in ("guidance", "hda", "rl", "studies") for path in (ROOT / package).rglob("*.py")
 ]
 
+CONSTANTS = {"TILE_SIZE": "1000", "COARSEST_PIXEL:g": "10", "MOST_UNKNOWN:.0%": "10%"}
+"""What messages name, and what the page says for it."""
+
 
 def said_words() -> str:
     """All text of the sources and the Makefile; a message is often split over lines, and names constants."""
     text = "\n".join(path.read_text(encoding="utf-8") for path in [*SOURCES, ROOT / "Makefile"])
     text = re.sub(r'"\s*\n\s*f?"', "", text)
-    for name, value in {"TILE_SIZE": "1000", "COARSEST_PIXEL:g": "10", "MOST_UNKNOWN:.0%": "10%"}.items():
+    for name, value in CONSTANTS.items():
         text = text.replace("{" + name + "}", value)
     return text
 
@@ -39,3 +43,44 @@ def test_a_message_stands_in_the_sources(message: str) -> None:
     parts = [part.strip(" :,;'") for part in message.split("...")]
     for part in parts:
         assert part in text, f"{part!r} of {message!r}"
+
+
+RAISED_FOR_USERS = ("ValueError", "ImportError", "FileExistsError", "RuntimeError")
+
+
+def template(node: ast.expr) -> str:
+    """A message with dots for what differs."""
+    if isinstance(node, ast.Constant):
+        return str(node.value)
+    if isinstance(node, ast.JoinedStr):
+        return "".join(template(value) for value in node.values)
+    if isinstance(node, ast.FormattedValue):
+        name = re.search(r"\{(.+)\}", ast.unparse(node))
+        return CONSTANTS.get(name.group(1), "...") if name else "..."
+    if isinstance(node, ast.BinOp):
+        return template(node.left) + template(node.right)
+    return "..."
+
+
+def raised() -> list[str]:
+    """Messages of every `raise`, each with words of its own."""
+    found = []
+    for path in SOURCES:
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if not (isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call) and node.exc.args):
+                continue
+            kind = ast.unparse(node.exc.func)
+            text = template(node.exc.args[0])
+            if (kind in RAISED_FOR_USERS or kind.endswith("Error")) and re.search("[a-z]{3}", text):
+                found.append(text)
+    return sorted(set(found))
+
+
+def test_there_are_many_messages() -> None:
+    assert len(raised()) > 200
+
+
+@pytest.mark.parametrize("message", raised())
+def test_a_message_has_a_form_on_the_page(message: str) -> None:
+    forms = [".*".join(re.escape(part.strip(" :,;'")) for part in form.split("...")) for form in messages()]
+    assert any(re.search(form, message, re.DOTALL) for form in forms), "say on the page what to do"
