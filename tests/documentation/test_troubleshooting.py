@@ -1,4 +1,4 @@
-"""The page on troubleshooting shows messages that the software can give, and each that it raises has a form there."""
+"""The page on troubleshooting shows messages that exist, and each that is raised has a form there."""
 
 import ast
 import re
