@@ -25,12 +25,14 @@ class PostAxis:
     Attributes:
         first_cell: first cell that these posts reach into; cell 0 begins where post 0 begins.
         cells: number of cells that they reach into.
+        posts: their number.
         mean: shape (posts, cells), the mean over each post from the cells.
         surface: shape (cells, posts), the cells of a smooth surface through the posts (cubic convolution).
     """
 
     first_cell: int
     cells: int
+    posts: int
     mean: csr_array
     surface: csr_array
 
@@ -50,7 +52,7 @@ def lay_posts(first_cell: int, cells: int, side: float, posts: int) -> PostAxis:
     count = mean.last - mean.first
     through = axis_weights(mean.first, count, side, posts)
     surface = through.weights[:, first - through.first : last - through.first]
-    return PostAxis(mean.first, count, mean.weights, surface.tocsr())
+    return PostAxis(mean.first, count, last - first, mean.weights, surface.tocsr())
 
 
 def remove_post_means(relief: Array, north: PostAxis, east: PostAxis) -> Array:
