@@ -114,21 +114,10 @@ def test_a_tile_without_hazard_does_not_stop_the_study(
 def test_posts_of_5_m_go_to_a_table_of_all_policies(tmp_path: Path) -> None:
     """One command, from an orbiter's GeoTIFF to every policy that flies by default."""
     write_site(tmp_path / "site.tif")
-    words = [
-        "--detail",
-        "3",
-        "--rock-abundance",
-        "medium",
-        "--preset",
-        "lidar",
-        "--episodes",
-        "2",
-        "--workers",
-        "1",
-        "--no-figures",
-    ]
     terrain, out = tmp_path / "site.tif", tmp_path / "study"
-    compare(read_options(["--terrain", str(terrain), "--out", str(out), *words]))
+    ground = ["--terrain", str(terrain), "--detail", "3", "--rock-abundance", "medium", "--preset", "lidar"]
+    study = ["--episodes", "2", "--workers", "1", "--no-figures", "--out", str(out)]
+    compare(read_options([*ground, *study]))
     with (out / "table.csv").open(newline="") as stream:
         assert {row["policy"] for row in csv.DictReader(stream)} >= set(
             choose_policies(("default",), "lidar")[0]
