@@ -12,6 +12,7 @@ from guidance.arrays import Array
 from guidance.lander import Lander
 from guidance.state import State
 from hda.safety.criteria import DEFAULT_CRITERIA, SafetyCriteria
+from hda.safety.touchdown_stance import Stance
 from hda.sensing.gridding import PixelGrid
 from hda.sensing.lidar import Lidar
 from hda.sensing.measured_look import MeasuredGround
@@ -63,13 +64,16 @@ class Observation:
         index: number of the decision, from 0.
         time: [s] since the start.
         state: estimated position, velocity and mass.
-        target: [m] shape (3,), current target: the centre of the look.
+        target: [m] shape (3,), current target: the centre of the look. Where flights end on real ground its
+            height is the newest that was measured there.
         safety_map: shape (n, n), observed probability of safety, row i grows north, column j east. Of a
             ranging LIDAR it is Algorithm 1's verdict on the measured ground, 0 where that is not known.
         width: [m] side of the square look.
         time_to_go: [s] what remains of the commanded time to go.
         ground: what a ranging LIDAR measured, in the frame of the estimated state; None where the sensor
             gives the map alone.
+        stance: pads and belly of a lander that touches down on real ground; None where sites lie on the
+            target plane.
     """
 
     index: int
@@ -80,6 +84,7 @@ class Observation:
     width: float
     time_to_go: float
     ground: MeasuredGround | None = None
+    stance: Stance | None = None
 
     @property
     def has_map(self) -> bool:
@@ -113,15 +118,35 @@ class Observation:
         return ((np.arange(n) + 0.5) / n - 0.5) * self.width
 
     def site(self, row: int, column: int) -> Array:
-        """[m] shape (3,), centre of pixel (row, column) on the target plane."""
+        """[m] shape (3,), centre of pixel (row, column), on the target plane or the measured ground."""
         n = self.safety_map.shape[0]
-        return np.array(
-            [
-                self.target[0] + ((column + 0.5) / n - 0.5) * self.width,
-                self.target[1] + ((row + 0.5) / n - 0.5) * self.width,
-                self.target[2],
-            ]
+        return self.settled(
+            np.array(
+                [
+                    self.target[0] + ((column + 0.5) / n - 0.5) * self.width,
+                    self.target[1] + ((row + 0.5) / n - 0.5) * self.width,
+                    self.target[2],
+                ]
+            )
         )
+
+    def settled(self, site: Array) -> Array:
+        """[m] shape (3,), a site at the height of its ground; itself where sites lie on the target plane."""
+        if self.stance is None:
+            return site
+        return np.array([site[0], site[1], self.ground_height(float(site[0]), float(site[1]))])
+
+    def ground_height(self, x: float, y: float) -> float:
+        """[m] height of the pads' plane when the upright lander first touches the measured ground at (x, y).
+
+        Of the target it is the target's own. Where no ground was measured under any pad it is the middle
+        height of this look, or the target's. Where sites lie on the target plane it is the plane's.
+        """
+        target = float(self.target[2])
+        if self.stance is None or self.ground is None or (x == self.target[0] and y == self.target[1]):
+            return target
+        height, pads = self.ground.contact_height(self.stance, x, y)
+        return height if pads > 0 else self.ground.middle_height(target)
 
     def pixel(self, site: Array) -> tuple[int, int] | None:
         """(row, column) of the pixel that contains `site` (its x and y count), or None outside the look."""
