@@ -21,13 +21,14 @@ from hda.flight.record import EpisodeRecord
 from hda.flight.touchdown_report import judge_touchdown
 from hda.flight.vehicle import ControlPeriods, FlightErrors, FlightStatus, Segment, Surroundings, fly_over
 from hda.policy import Decision, Memory, Policy, PrivilegedPolicy
+from hda.safety.touchdown_stance import Stance
 from hda.sensing.lidar import look
 from hda.sensing.measured_look import MeasuredGround, measure_ground
 from hda.sensing.ranging import RangingLidar, scan
 from hda.task.observation import Observation
 from hda.task.scenario import Scenario, estimated_state, ground_point
 
-_LATE = 0.5  # of a decision interval: with less time to go the target's height is no longer changed
+_LATE = 0.5  # of a decision interval: with less time to go no height is changed any more
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +89,9 @@ def observe(scenario: Scenario, flight: Flight) -> Observation:
     position = flight.state.position
     aim = ground_point(scenario, flight.target)
     estimate, width = estimated_state(scenario, flight.state), lidar.width(position, aim)
-    ground = None
+    rules = scenario.preset.rules
+    late = flight.index > 0 and flight.time_to_go <= _LATE * rules.decision_interval
+    stance, ground = None if late else scenario.preset.stance, None
     if isinstance(lidar, RangingLidar):
         ground = _measure(scenario, lidar, flight, estimate)
         safety_map = ground.safety_map(flight.target, width, lidar.pixels)
@@ -99,29 +102,27 @@ def observe(scenario: Scenario, flight: Flight) -> Observation:
         safety_map = look(lidar, position, aim, scenario.tile.probability, noise)
     return Observation(
         index=flight.index,
-        time=flight.index * scenario.preset.rules.decision_interval,
+        time=flight.index * rules.decision_interval,
         state=estimate,
-        target=_measured_target(scenario, flight, ground),
+        target=_measured_target(stance, flight, ground),
         safety_map=safety_map,
         width=width,
         time_to_go=flight.time_to_go,
         ground=ground,
-        stance=scenario.preset.stance,
+        stance=stance,
     )
 
 
-def _measured_target(scenario: Scenario, flight: Flight, ground: MeasuredGround | None) -> Array:
-    """The target at the height of this look's ground; as it was where flights end on the target plane.
+def _measured_target(stance: Stance | None, flight: Flight, ground: MeasuredGround | None) -> Array:
+    """The target at the height of this look's ground; as it was where sites keep the target's height.
 
-    An earlier height is kept where this look misses the ground of a pad, or where so little time is left that
-    the flight would be troubled more by a new height than by the error of the old.
+    After the first look an earlier height is kept where this one misses the ground of a pad.
     """
-    stance, target = scenario.preset.stance, flight.target
+    target = flight.target
     if stance is None or ground is None:
         return target
-    height, pads = ground.contact_height(stance, float(target[0]), float(target[1]))
-    late = flight.time_to_go <= _LATE * scenario.preset.rules.decision_interval
-    if flight.index > 0 and (late or pads < stance.pads.shape[0]):
+    height, pads = ground.site_height(stance, float(target[0]), float(target[1]))
+    if flight.index > 0 and pads < stance.pads.shape[0]:
         return target
     return np.array([target[0], target[1], height if pads > 0 else ground.middle_height(float(target[2]))])
 

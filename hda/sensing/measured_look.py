@@ -16,6 +16,10 @@ from hda.safety.touchdown_stance import Stance
 from hda.sensing.gridding import ElevationMap, PixelGrid, grid_points, lay_grid
 from hda.sensing.ranging import PointCloud, RangingLidar
 
+STANDOFF = 0.15
+"""[m] above the measured contact at which a site is put (chosen: about two sigma of that height in a look from
+below 300 m). To fall so far costs 0.7 m/s; to meet the ground before the flight is at rest may cost more."""
+
 
 @dataclass(frozen=True, eq=False)
 class MeasuredGround:
@@ -70,6 +74,11 @@ class MeasuredGround:
         known = np.isfinite(pads)
         highest = float(np.fmax.reduce(np.concatenate([pads, belly])))
         return highest if known.any() else np.nan, int(known.sum())
+
+    def site_height(self, stance: Stance, x: float, y: float) -> tuple[float, int]:
+        """As `contact_height`, but the height to fly to: `STANDOFF` above the contact."""
+        height, pads = self.contact_height(stance, x, y)
+        return height + STANDOFF, pads
 
     def middle_height(self, otherwise: float) -> float:
         """[m] median of the measured heights, or `otherwise` if there are none."""

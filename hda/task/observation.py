@@ -72,8 +72,9 @@ class Observation:
         time_to_go: [s] what remains of the commanded time to go.
         ground: what a ranging LIDAR measured, in the frame of the estimated state; None where the sensor
             gives the map alone.
-        stance: pads and belly of a lander that touches down on real ground; None where sites lie on the
-            target plane.
+        stance: pads and belly of a lander that touches down on real ground; None where sites keep the height
+            of the target: on a target plane, and when so little time is left that a new height would trouble
+            the flight more than the error of the old.
     """
 
     index: int
@@ -131,22 +132,24 @@ class Observation:
         )
 
     def settled(self, site: Array) -> Array:
-        """[m] shape (3,), a site at the height of its ground; itself where sites lie on the target plane."""
+        """[m] shape (3,), a site at the height of its ground; itself where sites keep the target's height."""
         if self.stance is None:
             return site
         return np.array([site[0], site[1], self.ground_height(float(site[0]), float(site[1]))])
 
     def ground_height(self, x: float, y: float) -> float:
-        """[m] height of the pads' plane when the upright lander first touches the measured ground at (x, y).
+        """[m] height to fly to at (x, y): just above where the upright lander first touches measured ground.
 
-        Of the target it is the target's own. Where no ground was measured under any pad it is the middle
-        height of this look, or the target's. Where sites lie on the target plane it is the plane's.
+        That is `hda.sensing.measured_look.STANDOFF` above the contact of a pad or of the belly.
+        It is the target's height of the target itself, where sites keep that height, where the ground of no
+        pad was measured, and near the target where that of some was not.
         """
-        target = float(self.target[2])
-        if self.stance is None or self.ground is None or (x == self.target[0] and y == self.target[1]):
+        target, stance = float(self.target[2]), self.stance
+        away = math.hypot(x - self.target[0], y - self.target[1])
+        if stance is None or self.ground is None or away == 0.0:
             return target
-        height, pads = self.ground.contact_height(self.stance, x, y)
-        return height if pads > 0 else self.ground.middle_height(target)
+        height, pads = self.ground.site_height(stance, x, y)
+        return height if pads == 4 or (pads > 0 and away > stance.pad_distance) else target
 
     def pixel(self, site: Array) -> tuple[int, int] | None:
         """(row, column) of the pixel that contains `site` (its x and y count), or None outside the look."""
