@@ -30,11 +30,16 @@ class Pose:
 
 
 def stand(footing: Footing, x: float, y: float) -> Pose:
-    """Set the lander down at (x, y) [m]; where a pad has no known ground, it stands on the plane there."""
+    """Set the lander down at (x, y) [m].
+
+    A pad without known ground stands as high as the highest other, or on the plane where there is none.
+    """
     pads, radius = footing.pads, footing.pad_radius
     found = [pad_height(footing.elevation, x + east, y + north, radius) for east, north in pads.tolist()]
     known = all(complete for _, complete in found)
-    heights = np.array([height if math.isfinite(height) else footing.plane for height, _ in found])
+    heights = np.array([height for height, _ in found])
+    others = heights[np.isfinite(heights)].max(initial=-np.inf)
+    heights[~np.isfinite(heights)] = others if math.isfinite(others) else footing.plane
     centre, gradients = _stable_planes(pads, heights)
     offsets, ground = _ground_between(footing, x, y)
     known = known and bool(np.isfinite(ground).all())

@@ -1,7 +1,7 @@
 """The lander upright over true ground: at which height its pads or its belly first touch.
 
 Ground between the centres of four cells is their bilinear interpolation, as for the rays of a LIDAR. A pad
-rests on the highest ground under its disc: its middle, eight points of its rim, and the centres of cells in
+rests on the highest ground under its disc: its middle, 16 points of its rim, and the centres of cells in
 it. The belly is met by the centres of cells between the pads, as in Algorithm 1.
 """
 
@@ -19,7 +19,7 @@ from guidance.kernel import compile_kernel
 from guidance.validation import finite_number
 from hda.safety.criteria import SafetyCriteria
 
-_RIM = 8  # points of a pad's rim
+_RIM = 16  # points of a pad's rim
 _RIM_EAST = np.cos(2.0 * np.pi * np.arange(_RIM) / _RIM)
 _RIM_NORTH = np.sin(2.0 * np.pi * np.arange(_RIM) / _RIM)
 

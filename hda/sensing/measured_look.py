@@ -17,8 +17,8 @@ from hda.sensing.gridding import ElevationMap, PixelGrid, grid_points, lay_grid
 from hda.sensing.ranging import PointCloud, RangingLidar
 
 STANDOFF = 0.15
-"""[m] above the measured contact at which a site is put (chosen: about two sigma of that height in a look from
-below 300 m). To fall so far costs 0.7 m/s; to meet the ground before the flight is at rest may cost more."""
+"""[m] above the measured contact at which a site is put: about two sigma of that height, seen from 300 m. To
+fall so far costs 0.7 m/s; to meet the ground before the flight is at rest may cost more."""
 
 
 @dataclass(frozen=True, eq=False)
