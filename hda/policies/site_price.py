@@ -23,11 +23,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from guidance.arrays import Array
-from guidance.kernel import compile_kernel
+from guidance.kernel import compile_vector_kernel
 from guidance.two_impulse import divert_cost
 from guidance.validation import finite_number
 from hda.policies.belief import GroundBelief
-from hda.policies.summed_area import sum_box, summed_area
+from hda.policies.summed_area import add_two_rows, sum_box
 from hda.task.observation import Observation, ScenarioView
 
 LATTICE = 8
@@ -130,24 +130,25 @@ def landing_probability(safe: NDArray[np.float32], dispersion: float) -> NDArray
     return out
 
 
-@compile_kernel
+@compile_vector_kernel
 def _smooth_into(safe: NDArray[np.float32], weights: Array, out: NDArray[np.float32]) -> None:
     """Weighted mean over five cells along each axis; beyond the square nothing is safe."""
     n = safe.shape[0]
-    across = np.zeros((n, n))
-    for row in range(n):
-        for column in range(2, n - 2):
-            total = weights[0] * safe[row, column]
-            for step in (1, 2):
-                total += weights[step] * (safe[row, column - step] + safe[row, column + step])
-            across[row, column] = total
+    middle, near, far = weights
+    smoothed = np.zeros((5, n))  # the last five rows, along their columns
     out[:] = 0.0
-    for row in range(2, n - 2):
+    for row in range(n):
+        here, across = safe[row], smoothed[row % 5]
+        for column in range(2, n - 2):
+            total = middle * here[column] + near * (here[column - 1] + here[column + 1])
+            across[column] = total + far * (here[column - 2] + here[column + 2])
+        if row < 4:
+            continue
+        south, second, third = smoothed[(row - 4) % 5], smoothed[(row - 3) % 5], smoothed[(row - 2) % 5]
+        fourth, north, mean = smoothed[(row - 1) % 5], smoothed[row % 5], out[row - 2]
         for column in range(n):
-            total = weights[0] * across[row, column]
-            for step in (1, 2):
-                total += weights[step] * (across[row - step, column] + across[row + step, column])
-            out[row, column] = total
+            total = middle * third[column] + near * (second[column] + fourth[column])
+            mean[column] = total + far * (south[column] + north[column])
 
 
 def propellant_map(observation: Observation, view: ScenarioView, belief: GroundBelief) -> Array:
@@ -163,19 +164,22 @@ def propellant_map(observation: Observation, view: ScenarioView, belief: GroundB
     )
 
 
-@compile_kernel
-def _split_by_likelihood(
-    safe: NDArray[np.float32], next_look: NextLook, known: NDArray[np.float32], unknown: NDArray[np.float32]
+@compile_vector_kernel
+def _sum_by_likelihood(
+    safe: NDArray[np.float32], next_look: NextLook, known: Array, unknown: Array
 ) -> None:
-    """Write what is probably safe, and what safe ground the next look may show among the rest."""
-    for row in range(safe.shape[0]):
-        north = (row + 0.5 - next_look.north) ** 2
-        for column in range(safe.shape[1]):
+    """Integral images of what is probably safe, and of what the next look may show among the rest."""
+    n = safe.shape[0]
+    below_known, below_unknown = np.zeros(n), np.zeros(n)
+    radius_squared, nothing = next_look.nadir_radius**2, np.float32(0.0)
+    for row in range(n):
+        here, north = safe[row], (row + 0.5 - next_look.north) ** 2
+        for column in range(n):
             across = north + (column + 0.5 - next_look.east) ** 2
-            likely = safe[row, column] > 0.5
-            seen = across <= next_look.nadir_radius**2
-            known[row, column] = safe[row, column] if likely else 0.0
-            unknown[row, column] = safe[row, column] if not likely and seen else 0.0
+            likely, seen = here[column] > 0.5, across <= radius_squared
+            below_known[column] += here[column] if likely else nothing
+            below_unknown[column] += here[column] if not likely and seen else nothing
+        add_two_rows((below_known, below_unknown), (known[row + 1], unknown[row + 1]))
 
 
 class _Outlook(NamedTuple):
@@ -187,23 +191,28 @@ class _Outlook(NamedTuple):
 
 
 class _Lattice(NamedTuple):
-    """Propellant [kg] on the lattice; for each cell along an axis the point before it, and how far beyond."""
+    """Propellant [kg] between a lattice's points: its rows, at the cells along them, and where cells lie.
 
-    propellant: Array
+    Attributes:
+        rows: shape (m, n), at the centre of each column of cells on each row of the lattice.
+        point: shape (n,), the lattice's row before each row of cells.
+        beyond: shape (n,), share of the way from there to the next.
+    """
+
+    rows: Array
     point: NDArray[np.int64]
     beyond: Array
 
 
-@compile_kernel
-def _interpolate(lattice: _Lattice, row: int, column: int) -> float:
-    """[kg] bilinear, at a cell's centre."""
-    propellant = lattice.propellant
-    i, s, j, t = lattice.point[row], lattice.beyond[row], lattice.point[column], lattice.beyond[column]
-    price = (1.0 - s) * ((1.0 - t) * propellant[i, j] + t * propellant[i, j + 1])
-    return price + s * ((1.0 - t) * propellant[i + 1, j] + t * propellant[i + 1, j + 1])
+def _between_points(propellant: Array, cells: int) -> _Lattice:
+    place = (np.arange(cells) + 0.5) / LATTICE
+    point = place.astype(np.int64)
+    beyond = place - point
+    rows = (1.0 - beyond) * propellant[:, point] + beyond * propellant[:, point + 1]
+    return _Lattice(rows, point, beyond)
 
 
-@compile_kernel
+@compile_vector_kernel
 def _price_blindly(
     landing: NDArray[np.float32],
     lattice: _Lattice,
@@ -212,16 +221,20 @@ def _price_blindly(
     out: Array,
 ) -> float:
     """Fill J as if no later look, or each with a share of the failures left, helped; the least J without."""
-    least, n = np.inf, landing.shape[0]
+    n = landing.shape[0]
+    least = np.full(n, np.inf)
+    averted, all_failures = prices.divert + prices.failure * share, prices.divert + prices.failure
     for row in range(n):
+        i, s = lattice.point[row], lattice.beyond[row]
+        south, north, chance, priced = lattice.rows[i], lattice.rows[i + 1], landing[row], out[row]
         for column in range(n):
-            price, risk = _interpolate(lattice, row, column), 1.0 - landing[row, column]
-            out[row, column] = price + risk * (prices.divert + prices.failure * share)
-            least = min(least, price + risk * (prices.divert + prices.failure))
-    return least
+            price, risk = (1.0 - s) * south[column] + s * north[column], 1.0 - chance[column]
+            priced[column] = price + risk * averted
+            least[column] = min(least[column], price + risk * all_failures)
+    return least.min()
 
 
-@compile_kernel
+@compile_vector_kernel
 def _price_cells(
     landing: NDArray[np.float32],
     outlook: _Outlook,
@@ -235,10 +248,12 @@ def _price_cells(
     height = next_look.height
     divert_distance = max(prices.divert_slope * height, 1.0)
     for row in range(n):
+        i, s = lattice.point[row], lattice.beyond[row]
         for column in range(n):
             if out[row, column] > most:
                 continue
-            price, risk = _interpolate(lattice, row, column), 1.0 - landing[row, column]
+            price = (1.0 - s) * lattice.rows[i, column] + s * lattice.rows[i + 1, column]
+            risk = 1.0 - landing[row, column]
             across = (column + 0.5 - next_look.east) ** 2 + (row + 0.5 - next_look.north) ** 2
             half_width = next_look.half_width_slope * math.sqrt(across + height * height)
             exponent = sum_box(outlook.known, row, column, divert_distance) / prices.surprise_area
@@ -264,8 +279,7 @@ def price_sites(
             a fraction of the time.
     """
     n = safe.shape[0]
-    down = (np.arange(n) + 0.5) / LATTICE
-    lattice = _Lattice(propellant, down.astype(np.int64), down - down.astype(np.int64))
+    lattice = _between_points(propellant, n)
     prices = _Prices(
         weights.failure_cost,
         weights.divert_cost,
@@ -276,8 +290,7 @@ def price_sites(
     out, landing = np.empty((n, n)), landing_probability(safe, weights.dispersion)
     least = _price_blindly(landing, lattice, prices, 0.0 if next_look.useful else 1.0, out)
     if next_look.useful:
-        known, unknown = np.empty_like(safe), np.empty_like(safe)
-        _split_by_likelihood(safe, next_look, known, unknown)
-        outlook = _Outlook(next_look, summed_area(known), summed_area(unknown))
-        _price_cells(landing, outlook, lattice, prices, least + within, out)
+        known, unknown = np.zeros((n + 1, n + 1)), np.zeros((n + 1, n + 1))
+        _sum_by_likelihood(safe, next_look, known, unknown)
+        _price_cells(landing, _Outlook(next_look, known, unknown), lattice, prices, least + within, out)
     return out

@@ -1,31 +1,28 @@
-"""Integral images: the sum over any rectangle of cells in four reads."""
+"""Integral images: the sum over any rectangle of cells in four reads.
+
+Entry (i, j) of an image of n x n cells, shape (n + 1, n + 1), is the sum over rows below i and columns below j.
+"""
 
 from __future__ import annotations
-
-import numpy as np
-from numpy.typing import NDArray
 
 from guidance.arrays import Array
 from guidance.kernel import compile_kernel
 
 
-def summed_area(density: NDArray[np.float32]) -> Array:
-    """Integral image, shape (n + 1, n + 1): entry (i, j) is the sum over rows below i and columns below j."""
-    out = np.zeros((density.shape[0] + 1, density.shape[1] + 1))
-    _sum_into(density, out)
-    return out
-
-
 @compile_kernel
-def _sum_into(density: NDArray[np.float32], out: Array) -> None:
-    rows, columns = density.shape
-    below = np.zeros(columns)
-    for row in range(rows):
-        total = 0.0
-        for column in range(columns):
-            below[column] += density[row, column]
-            total += below[column]
-            out[row + 1, column + 1] = total
+def add_two_rows(below: tuple[Array, Array], out: tuple[Array, Array]) -> None:
+    """Write a row of two integral images from the sums of their columns so far, shape (n,) each.
+
+    Two sums run side by side, since each addition waits for the one before.
+    """
+    below_first, below_second = below
+    first_out, second_out = out
+    first, second = 0.0, 0.0
+    for column in range(below_first.size):
+        first += below_first[column]
+        second += below_second[column]
+        first_out[column + 1] = first
+        second_out[column + 1] = second
 
 
 @compile_kernel
