@@ -1,6 +1,6 @@
 """Readings of the map that looks gave, cell by cell: what they say of each level, and of safe ground.
 
-They are kept on the rectangle of cells that holds them, which is far less than the square that a policy prices.
+They are kept on the rectangle of cells that holds them: far less than the square that a policy prices.
 """
 
 from __future__ import annotations
@@ -17,6 +17,8 @@ from guidance.kernel import compile_vector_kernel
 _LEAST_DEVIATION = 1e-3  # of a noiseless sensor: a level stands for an interval, not for one number
 _LEAST_LIKELIHOOD = 1e-300
 _NO_TAIL = 27.0  # erfc beyond is less than twice that
+
+
 @dataclass(frozen=True, eq=False)
 class CellReadings:
     """All readings so far, on a rectangle of cells; row grows north, column east.
