@@ -124,13 +124,11 @@ def infer_unseen(probability: NDArray[np.float32], seen: NDArray[np.bool_]) -> N
         Shape (n, n): the posterior where seen, else the share of the training ground that is safe at such
         distances from seen ground.
     """
-    table, class_of_square = safe_share_table(), _class_of_square()
+    table, near = safe_share_table(), _near_seen(seen)
+    seen, part = np.ascontiguousarray(seen[near]), probability[near].copy()  # in one order, for the kernels
+    likely = part > 0.5
+    to_safe, to_unsafe = squared_distance(seen & likely), squared_distance(seen & ~likely)
+    _infer_into(to_safe, to_unsafe, seen, _class_of_square(), table, part)
     out = np.full(probability.shape, table[-1, -1], dtype=np.float32)
-    near = _near_seen(seen)
-    seen, probability, part = seen[near], probability[near], out[near]
-    likely = probability > 0.5
-    part[:] = probability
-    _infer_into(
-        squared_distance(seen & likely), squared_distance(seen & ~likely), seen, class_of_square, table, part
-    )
+    out[near] = part
     return out

@@ -11,7 +11,7 @@ from rl.inference.networks import MapEncoder
 
 
 def convolve_plainly(image: np.ndarray, kernel: np.ndarray, bias: np.ndarray) -> np.ndarray:
-    """Image (in, rows, columns), kernel (4, 4, in, out) -> (out, rows / 2, columns / 2), four terms at a time."""
+    """Image (in, rows, columns), kernel (4, 4, in, out) -> (out, rows / 2, columns / 2): four terms a time."""
     inputs, rows, columns = image.shape
     padded = np.pad(image, ((0, 0), (1, 1), (1, 1)))
     total = np.broadcast_to(bias[:, None, None], (bias.size, rows // 2, columns // 2)).copy()
@@ -29,9 +29,7 @@ def convolve_plainly(image: np.ndarray, kernel: np.ndarray, bias: np.ndarray) ->
 def encode_plainly(safety_map: np.ndarray, tensors: dict[str, np.ndarray], layers: int) -> np.ndarray:
     image = safety_map[None]
     for k in range(layers):
-        image = convolve_plainly(
-            image, tensors[f"convolution.{k}.weight"], tensors[f"convolution.{k}.bias"]
-        )
+        image = convolve_plainly(image, tensors[f"convolution.{k}.weight"], tensors[f"convolution.{k}.bias"])
     out = tensors["latent.bias"].copy()
     for value, row in zip(image.transpose(1, 2, 0).ravel(), tensors["latent.weight"], strict=True):
         out += value * row
