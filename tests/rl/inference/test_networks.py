@@ -11,7 +11,7 @@ from rl.inference.networks import MapEncoder
 
 
 def convolve_plainly(image: np.ndarray, kernel: np.ndarray, bias: np.ndarray) -> np.ndarray:
-    """Image (in, rows, columns), kernel (4, 4, in, out) -> (out, rows / 2, columns / 2): four terms a time."""
+    """Image (in, rows, columns), kernel (4, 4, in, out) -> (out, rows/2, columns/2), in fours of terms."""
     inputs, rows, columns = image.shape
     padded = np.pad(image, ((0, 0), (1, 1), (1, 1)))
     total = np.broadcast_to(bias[:, None, None], (bias.size, rows // 2, columns // 2)).copy()
