@@ -134,7 +134,8 @@ def _measure(scenario: Scenario, lidar: RangingLidar, flight: Flight, estimate: 
     """
     draws = scenario.streams.scan(flight.index, lidar.rays)
     aim = ground_point(scenario, flight.target)
-    cloud = scan(lidar, scenario.tile.elevation, flight.state, aim, draws)
+    tile = scenario.tile
+    cloud = scan(lidar, tile.elevation, flight.state, aim, draws, tile.highest)
     error = estimate.position - flight.state.position
     aim = aim + error  # the plane's height is believed as wrongly as the vehicle's own
     return measure_ground(cloud, lidar, estimate.position, aim, scenario.preset.criteria)
