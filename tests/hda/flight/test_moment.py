@@ -71,11 +71,12 @@ def test_a_measured_look_is_shown_beside_the_truth() -> None:
         axes = {axis.get_label(): axis for axis in draw_moment(moment).axes}
         assert set(axes) == {"ground", "height", "seen", "verdict", "truth"}
         observation, tile = flown.observations[moment.look], flown.scenario.tile
-        shown = {name: axes[name].images[0].get_array() for name in ("seen", "verdict", "truth")}
+        shown = {name: axes[name].images[0] for name in ("seen", "verdict", "truth")}
+        drawn = {name: np.ma.asarray(image.get_array()) for name, image in shown.items()}
         assert observation.elevation is not None
-        np.testing.assert_array_equal(np.ma.getmaskarray(shown["seen"]), np.isnan(observation.elevation))
-        np.testing.assert_array_equal(shown["verdict"], observation.safety_map)
-        np.testing.assert_array_equal(shown["truth"], tile.deterministic)
+        np.testing.assert_array_equal(np.ma.getmaskarray(drawn["seen"]), np.isnan(observation.elevation))
+        np.testing.assert_array_equal(drawn["verdict"], observation.safety_map)
+        np.testing.assert_array_equal(drawn["truth"], tile.deterministic)
         site = flown.decisions[moment.look].site
         for name in shown:
             assert np.ravel(line_data(axes[name], "target")) == pytest.approx(site[:2])
