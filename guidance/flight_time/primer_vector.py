@@ -16,8 +16,8 @@ from guidance.descent.problem import LandingProblem
 from guidance.flight_time.extremal import (
     Extremal,
     PrimerProblem,
+    blank_extremal,
     fly_extremal,
-    new_extremal,
     set_direction,
 )
 from guidance.flight_time.fixed_time import solve_primer_at
@@ -27,11 +27,15 @@ from guidance.flight_time.path_limits import (
     FINAL_DIRECTION,
     KEPT,
     LINE_OF_SIGHT,
-    PROPELLANT,
-    broken_limit,
+    PathLimits,
+    burnt_share,
+    judge_extremal,
     path_limits,
 )
 from guidance.flight_time.primer_equations import solve_primer, solve_touching
+from guidance.kernel import compile_kernel
+
+_NOT_FOUND = -1
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,12 +44,12 @@ class PrimerFlight:
 
     Attributes:
         extremal: its arcs and its primer, in seconds, as the kernels read it.
-        burn_rate: [1/s] share of the start mass burnt per second at full thrust.
+        scaled: the problem that it solves, in seconds.
         broken: the first limit of the problem that it breaks, as of `path_limits`; KEPT for none.
     """
 
     extremal: Extremal
-    burn_rate: float
+    scaled: PrimerProblem
     broken: int = KEPT
 
     @cached_property
@@ -66,7 +70,7 @@ class PrimerFlight:
     def burnt_at(self, times: Array) -> Array:
         """Share of the start mass that is burnt at times [s] of the flight, shape (k,)."""
         burning = np.minimum(times, self.first_burn) + np.maximum(times - self.braking, 0.0)
-        return self.burn_rate * burning
+        return self.scaled.mass_flow * burning
 
     def log_mass(self, nodes: int) -> Array:
         """ln(m / m_start) at N equal steps, shape (N,)."""
@@ -75,7 +79,7 @@ class PrimerFlight:
     @property
     def log_mass_ratio(self) -> float:
         """ln(start mass / final mass)."""
-        return -math.log1p(-self.burn_rate * (self.first_burn + self.time - self.braking))
+        return -math.log1p(-burnt_share(self.extremal, self.scaled.mass_flow))
 
     def direction_at(self, time: float) -> Array:
         """Unit vector of the primer, along which the thrust points; shape (3,)."""
@@ -117,31 +121,45 @@ def find_extremal_flight(problem: LandingProblem, time: float | None = None) -> 
         return None
     if problem.limits.thrust_rate is not None:
         return None
-    scaled, x = scale_landing(problem), new_extremal()
-    flight = None
-    if solve_primer(scaled, x) and (time is None or solve_primer_at(time, scaled, x)):
-        flight = PrimerFlight(x, scaled.mass_flow, _broken_limit(problem, scaled, x))
-        if flight.broken != ALTITUDE:
-            return flight
+    scaled, x = scale_landing(problem), blank_extremal()
+    limits, unit = problem.limits, lander.max_thrust / problem.state.mass
+    asked = path_limits(lander.pointing_limit, limits.speed, limits.glide_slope)
+    vehicle = asked, unit, problem.log_mass_ratio
+    flight = _read(problem, scaled, x, _seek(scaled, vehicle, math.nan if time is None else time, x))
+    if flight is not None and flight.broken != ALTITUDE:
+        return flight
     if time is None and find_ground_contact(problem) is None:
-        x = new_extremal()
-        if solve_touching(scaled, x):
-            return PrimerFlight(x, scaled.mass_flow, _broken_limit(problem, scaled, x))
+        x = blank_extremal()
+        return _read(problem, scaled, x, _seek_touching(scaled, vehicle, x)) or flight
     return flight
 
 
-def _broken_limit(problem: LandingProblem, scaled: PrimerProblem, x: Extremal) -> int:
-    """The first limit that an extremal breaks, as of `path_limits`; KEPT, which is zero, if it keeps all."""
-    if PrimerFlight(x, scaled.mass_flow).log_mass_ratio > problem.log_mass_ratio:
-        return PROPELLANT
-    limits, unit = problem.limits, problem.lander.max_thrust / problem.state.mass
-    path = fly_extremal(x, scaled)
-    asked = path_limits(problem.lander.pointing_limit, limits.speed, limits.glide_slope)
-    broken = broken_limit(path, asked, unit)
-    if broken:
-        return broken
-    final, sight = limits.final_thrust_direction, limits.line_of_sight
-    if final is not None and final.excess(path.direction[-1]) > 0.0:
-        return FINAL_DIRECTION
-    outside = sight is not None and sight.outside(unit * path.position[:-1]).max() > 0.0
-    return LINE_OF_SIGHT if outside else KEPT
+@compile_kernel
+def _seek(problem: PrimerProblem, vehicle: tuple[PathLimits, float, float], time: float, x: Extremal) -> int:
+    """Find the extremal of a time of flight [s], nan for the best one; what it breaks, or _NOT_FOUND.
+
+    Of the vehicle it takes the limits, full thrust over start mass [m/s^2] and ln(start mass / dry mass).
+    """
+    if solve_primer(problem, x) and (math.isnan(time) or solve_primer_at(time, problem, x)):
+        return judge_extremal(x, problem, *vehicle)
+    return _NOT_FOUND
+
+
+@compile_kernel
+def _seek_touching(problem: PrimerProblem, vehicle: tuple[PathLimits, float, float], x: Extremal) -> int:
+    """The same for the extremal that touches the ground, of the best time."""
+    return judge_extremal(x, problem, *vehicle) if solve_touching(problem, x) else _NOT_FOUND
+
+
+def _read(problem: LandingProblem, scaled: PrimerProblem, x: Extremal, broken: int) -> PrimerFlight | None:
+    """A flight that was sought, looked at for the limits that compiled code does not know."""
+    if broken == _NOT_FOUND:
+        return None
+    final, sight = problem.limits.final_thrust_direction, problem.limits.line_of_sight
+    if broken == KEPT and (final is not None or sight is not None):
+        path, unit = fly_extremal(x, scaled), problem.lander.max_thrust / problem.state.mass
+        if final is not None and final.excess(path.direction[-1]) > 0.0:
+            broken = FINAL_DIRECTION
+        elif sight is not None and sight.outside(unit * path.position[:-1]).max() > 0.0:
+            broken = LINE_OF_SIGHT
+    return PrimerFlight(x, scaled, broken)

@@ -22,9 +22,9 @@ import numpy as np
 from guidance.descent.certificate import Certificate
 from guidance.descent.plan import Plan, PlanStatus
 from guidance.descent.problem import LandingProblem
-from guidance.descent.trajectory import Trajectory
-from guidance.flight_time.primer_vector import PrimerFlight, find_extremal_flight, find_primer_flight
+from guidance.flight_time.primer_vector import PrimerFlight, find_extremal_flight
 from guidance.pdg.unrelaxed import plan_unrelaxed
+from guidance.planning.indirect_planner import plan_indirect
 from guidance.state import State
 
 if TYPE_CHECKING:
@@ -115,18 +115,23 @@ def answer(request: Request, unreachable: str) -> Plan:
 
 def _bounded(plan: Plan, request: Request) -> Plan:
     """The plan with a way to prove what no flight undercuts; of its duration, where that was asked for."""
-    if plan.status is not PlanStatus.OPTIMAL or plan.propellant <= 0.0 or plan.problem.rotates:
+    if plan.status is not PlanStatus.OPTIMAL or plan.proof is not None or plan.problem.rotates:
         return plan
+    return replace(plan, proof=_prover(request))
+
+
+def _prover(request: Request) -> Callable[[Plan], Certificate | None]:
+    """What proves that no flight undercuts a plan that answers a request."""
     this_time_alone = request.time_of_flight is not None
-    return replace(plan, proof=partial(_prove_bound, plan.problem, plan.trajectory, this_time_alone))
+    return partial(_prove_bound, None if this_time_alone else request.flight, this_time_alone)
 
 
-def _prove_bound(problem: LandingProblem, trajectory: Trajectory, this_time_alone: bool) -> Certificate:
+def _prove_bound(flight: PrimerFlight | None, this_time_alone: bool, plan: Plan) -> Certificate | None:
     from guidance.lower_bound.proof import prove_least_propellant
 
-    propellant = float(trajectory.mass[0] - trajectory.mass[-1])
-    flight = None if this_time_alone else find_primer_flight(problem)
-    return prove_least_propellant(problem, propellant, trajectory.duration, flight, this_time_alone)
+    if not plan.propellant > 0.0:
+        return None
+    return prove_least_propellant(plan.problem, plan.propellant, plan.time_of_flight, flight, this_time_alone)
 
 
 def _plan_again(request: Request, nodes: int, found: Plan) -> Plan:
@@ -144,9 +149,8 @@ def _plan_again(request: Request, nodes: int, found: Plan) -> Plan:
 def plan_by_method(request: Request) -> Plan:
     """Plan by the chosen method; a plan without a flight still lacks its proof."""
     if request.method in ("auto", "indirect"):
-        from guidance.planning.indirect_planner import plan_indirect
-
-        plan = plan_indirect(request.problem, request.nodes, request.flight)
+        proof = None if request.provisional else _prover(request)
+        plan = plan_indirect(request.problem, request.nodes, request.flight, proof)
         kept = plan.status.has_flight and (request.provisional or plan.keeps_limits)
         if kept or request.method == "indirect":  # a limit may break between the places that it looks at
             return plan

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
+from guidance.descent.certificate import Certificate
 from guidance.descent.plan import Plan, PlanStatus
 from guidance.descent.problem import LandingProblem
 from guidance.flight_time.primer_trajectory import lay_nodes
@@ -14,17 +17,24 @@ NOT_FOUND = (
 )
 
 
-def plan_indirect(problem: LandingProblem, nodes: int, flight: PrimerFlight | None) -> Plan:
+def plan_indirect(
+    problem: LandingProblem,
+    nodes: int,
+    flight: PrimerFlight | None,
+    proof: Callable[[Plan], Certificate | None] | None = None,
+) -> Plan:
     """Plan along a flight of the indirect method.
 
     Args:
         problem: what it solves.
         nodes: N, shared among the arcs; two for each arc at least.
         flight: what `find_primer_flight` found.
+        proof: what makes the plan's certificate.
 
     Returns:
         A plan that is OPTIMAL; or LIMIT_REACHED where there is no flight: others may find one.
     """
     if flight is None:
         return Plan(PlanStatus.LIMIT_REACHED, problem, METHOD, message=NOT_FOUND)
-    return Plan.of_flight(PlanStatus.OPTIMAL, problem, METHOD, lay_nodes(problem, flight, nodes))
+    laid = lay_nodes(problem, flight, nodes)
+    return Plan.of_flight(PlanStatus.OPTIMAL, problem, METHOD, laid, proof=proof)
