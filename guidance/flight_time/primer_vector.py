@@ -32,10 +32,12 @@ from guidance.flight_time.path_limits import (
     judge_extremal,
     path_limits,
 )
-from guidance.flight_time.primer_equations import solve_primer, solve_touching
+from guidance.flight_time.primer_equations import solve_from, solve_primer, solve_touching
 from guidance.kernel import compile_kernel
 
 _NOT_FOUND = -1
+_Vehicle = tuple[PathLimits, float, float]
+"""Limits, full thrust over start mass [m/s^2], and ln(start mass / dry mass)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,10 +123,7 @@ def find_extremal_flight(problem: LandingProblem, time: float | None = None) -> 
         return None
     if problem.limits.thrust_rate is not None:
         return None
-    scaled, x = scale_landing(problem), blank_extremal()
-    limits, unit = problem.limits, lander.max_thrust / problem.state.mass
-    asked = path_limits(lander.pointing_limit, limits.speed, limits.glide_slope)
-    vehicle = asked, unit, problem.log_mass_ratio
+    scaled, x, vehicle = scale_landing(problem), blank_extremal(), _vehicle(problem)
     flight = _read(problem, scaled, x, _seek(scaled, vehicle, math.nan if time is None else time, x))
     if flight is not None and flight.broken != ALTITUDE:
         return flight
@@ -134,21 +133,42 @@ def find_extremal_flight(problem: LandingProblem, time: float | None = None) -> 
     return flight
 
 
-@compile_kernel
-def _seek(problem: PrimerProblem, vehicle: tuple[PathLimits, float, float], time: float, x: Extremal) -> int:
-    """Find the extremal of a time of flight [s], nan for the best one; what it breaks, or _NOT_FOUND.
+def fly_to(problem: LandingProblem, x: Extremal, size: int) -> PrimerFlight | None:
+    """Flight along the extremal of a problem next to one that is known; None where there is none.
 
-    Of the vehicle it takes the limits, full thrust over start mass [m/s^2] and ln(start mass / dry mass).
+    Args:
+        problem: the landing problem.
+        x: an extremal of a problem that is nearly the same, in seconds; changed in place.
+        size: FREE, or TOUCHING where it touches the ground.
     """
+    scaled = scale_landing(problem)
+    return _read(problem, scaled, x, _seek_near(scaled, _vehicle(problem), size, x))
+
+
+def _vehicle(problem: LandingProblem) -> _Vehicle:
+    lander, limits = problem.lander, problem.limits
+    asked = path_limits(lander.pointing_limit, limits.speed, limits.glide_slope)
+    return asked, lander.max_thrust / problem.state.mass, problem.log_mass_ratio
+
+
+@compile_kernel
+def _seek(problem: PrimerProblem, vehicle: _Vehicle, time: float, x: Extremal) -> int:
+    """Find the extremal of a time of flight [s], nan for the best one; what it breaks, or _NOT_FOUND."""
     if solve_primer(problem, x) and (math.isnan(time) or solve_primer_at(time, problem, x)):
         return judge_extremal(x, problem, *vehicle)
     return _NOT_FOUND
 
 
 @compile_kernel
-def _seek_touching(problem: PrimerProblem, vehicle: tuple[PathLimits, float, float], x: Extremal) -> int:
+def _seek_touching(problem: PrimerProblem, vehicle: _Vehicle, x: Extremal) -> int:
     """The same for the extremal that touches the ground, of the best time."""
     return judge_extremal(x, problem, *vehicle) if solve_touching(problem, x) else _NOT_FOUND
+
+
+@compile_kernel
+def _seek_near(problem: PrimerProblem, vehicle: _Vehicle, size: int, x: Extremal) -> int:
+    """The same for the extremal next to a given one, with FREE or TOUCHING equations."""
+    return judge_extremal(x, problem, *vehicle) if solve_from(x, problem, size) else _NOT_FOUND
 
 
 def _read(problem: LandingProblem, scaled: PrimerProblem, x: Extremal, broken: int) -> PrimerFlight | None:

@@ -11,11 +11,12 @@ from guidance.arrays import Array
 from guidance.descent.certificate import Certificate
 from guidance.descent.dual_bound import DualBound, DualPiece
 from guidance.descent.problem import LandingProblem
+from guidance.flight_time.extremal import touches
 from guidance.flight_time.primer_vector import PrimerFlight
 from guidance.lower_bound.dual_ascent import two_impulse_primer
 from guidance.lower_bound.dual_case import dual_case
 from guidance.lower_bound.dual_function import AFFINE, THETA
-from guidance.lower_bound.neighbour_cover import primer_of
+from guidance.lower_bound.neighbour_cover import bound_by_neighbours, primer_of
 from guidance.lower_bound.time_cover import (
     GRANTED,
     CoverAim,
@@ -104,10 +105,15 @@ def certify_cover(
 def _bound_above_tank(
     problem: LandingProblem, time: float, flight: PrimerFlight | None = None
 ) -> DualBound | None:
-    """A bound that no tank pays for; None where there is none."""
+    """A bound that no tank pays for, by neighbours of an extremal or by a search; None without one."""
     exhaust = problem.lander.exhaust_velocity
     most = exhaust * problem.log_mass_ratio
     target = most + 2.0 * GRANTED * exhaust
+    if flight is not None and not touches(flight.extremal):
+        case = dual_case(problem, most)
+        times, cover = bound_by_neighbours(flight.extremal, flight.scaled, case, target, exhaust)
+        if cover.level >= target:
+            return _bound_by_cover(problem, most, times, cover)
     times, cover = _cover(problem, most, time, flight, CoverAim(target, GAP_TOLERANCE * exhaust, target))
     return _bound_by_cover(problem, most, times, cover) if cover.level >= target else None
 

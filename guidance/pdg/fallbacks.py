@@ -23,8 +23,9 @@ from guidance.descent.certificate import Certificate
 from guidance.descent.plan import Plan, PlanStatus
 from guidance.descent.problem import LandingProblem
 from guidance.flight_time.primer_vector import PrimerFlight, find_extremal_flight
+from guidance.flight_time.time_window import time_window
 from guidance.pdg.unrelaxed import plan_unrelaxed
-from guidance.planning.indirect_planner import plan_indirect
+from guidance.planning.indirect_planner import plan_indirect, plan_nearest_indirect
 from guidance.state import State
 
 if TYPE_CHECKING:
@@ -155,12 +156,9 @@ def plan_by_method(request: Request) -> Plan:
         if kept or request.method == "indirect":  # a limit may break between the places that it looks at
             return plan
     if request.bounds_first and request.flight is None:
-        from guidance.planning.infeasibility import prove_by_dual_bound
-
-        proof = prove_by_dual_bound(request.problem, request.extremal)
-        if proof is not None:
-            none = Plan(PlanStatus.INFEASIBLE, request.problem, "dual bound", message=_OUT_OF_REACH)
-            return replace(none, proof=proof)
+        none = _refuse(request)
+        if none is not None:
+            return none
     if request.method in ("auto", "convex"):
         return _plan_convex(request)
     if request.method == "cvxpy":
@@ -168,6 +166,22 @@ def plan_by_method(request: Request) -> Plan:
 
         return plan_cvxpy(request.problem, request.nodes, request.time_of_flight)
     return _plan_casadi(request)
+
+
+def _refuse(request: Request) -> Plan | None:
+    """Proof, without a solver, that no flight exists; None where these bounds show none."""
+    from guidance.planning.infeasibility import prove_by_dual_bound, prove_by_window
+
+    problem, window = request.problem, time_window(request.problem)
+    if window.empty:
+        proof, method, words = prove_by_window(window), "closed form", window.cause
+    else:
+        proof, method, words = (
+            prove_by_dual_bound(problem, request.extremal, window),
+            "dual bound",
+            _OUT_OF_REACH,
+        )
+    return None if proof is None else Plan(PlanStatus.INFEASIBLE, problem, method, message=words, proof=proof)
 
 
 def _plan_convex(request: Request) -> Plan:
@@ -244,12 +258,9 @@ def within_limits(plan: Plan, plan_again: Callable[[int, Plan], Plan]) -> Plan:
 
 def answer_without_flight(plan: Plan, request: Request, unreachable: str) -> Plan:
     """Fly to the nearest reachable point, where asked to, or tell infeasible from failed by a certificate."""
-    from guidance.planning.convex_planner import plan_nearest
-
-    problem, nodes, time_of_flight = request.problem, request.nodes, request.time_of_flight
-    anywhere = request.landing_error_weight is not None
+    time_of_flight, anywhere = request.time_of_flight, request.landing_error_weight is not None
     if unreachable == "nearest" and not anywhere:
-        nearest = plan_nearest(problem, nodes, time_of_flight, request.provisional)
+        nearest = _plan_nearest(request)
         nearest = replace(nearest, solves=plan.solves + nearest.solves)
         if nearest.status.has_flight:
             return nearest
@@ -269,6 +280,18 @@ def answer_without_flight(plan: Plan, request: Request, unreachable: str) -> Pla
         message = f"{plan.message}; infeasibility could not be proved"
         return replace(plan, status=PlanStatus.LIMIT_REACHED, message=message)
     return plan
+
+
+def _plan_nearest(request: Request) -> Plan:
+    """The reachable point nearest to the target: by the indirect method, else by the convex problem."""
+    from guidance.planning.convex_planner import plan_nearest
+
+    problem, nodes = request.problem, request.nodes
+    if request.method == "auto" and request.time_of_flight is None:
+        plan = plan_nearest_indirect(problem, nodes, request.extremal)
+        if plan.status.has_flight and (request.provisional or plan.keeps_limits):
+            return plan
+    return plan_nearest(problem, nodes, request.time_of_flight, request.provisional)
 
 
 def _prove_infeasible(request: Request, anywhere: bool) -> Certificate | ConvexSolution | None:
