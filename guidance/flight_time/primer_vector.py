@@ -21,6 +21,7 @@ from guidance.flight_time.extremal import (
     set_direction,
 )
 from guidance.flight_time.fixed_time import solve_primer_at
+from guidance.flight_time.full_burn import solve_full_burn
 from guidance.flight_time.ground_contact import find_ground_contact
 from guidance.flight_time.path_limits import (
     ALTITUDE,
@@ -100,7 +101,8 @@ def scale_landing(problem: LandingProblem) -> PrimerProblem:
 def find_primer_flight(problem: LandingProblem, time: float | None = None) -> PrimerFlight | None:
     """Flight of least propellant by the indirect method.
 
-    Where it would cut through the target's altitude in its first burn, the one that touches it there.
+    Where it would cut through the target's altitude in its first burn, the one that touches it there; where a
+    coast would only cost, the one that burns all the way.
 
     Args:
         problem: the landing problem.
@@ -109,8 +111,8 @@ def find_primer_flight(problem: LandingProblem, time: float | None = None) -> Pr
     Returns:
         The flight; None where none was found, where the engine cannot stop or cannot lift the vehicle, where
         the flight does not end at rest, where the frame turns, where the thrust may not jump, where gravity
-        vanishes, where no coast is left between the burns, or where the flight breaks a limit of the
-        problem: the method knows none but a touch of the ground, and that for the best time alone.
+        vanishes, or where the flight breaks a limit of the problem: the method knows none but a touch of the
+        ground, and that, like a flight without a coast, for the best time alone.
     """
     flight = find_extremal_flight(problem, time)
     return None if flight is None or flight.broken else flight
@@ -127,10 +129,15 @@ def find_extremal_flight(problem: LandingProblem, time: float | None = None) -> 
     flight = _read(problem, scaled, x, _seek(scaled, vehicle, math.nan if time is None else time, x))
     if flight is not None and flight.broken != ALTITUDE:
         return flight
-    if time is None and find_ground_contact(problem) is None:
+    if time is not None or find_ground_contact(problem) is not None:
+        return flight
+    if flight is None:
         x = blank_extremal()
-        return _read(problem, scaled, x, _seek_touching(scaled, vehicle, x)) or flight
-    return flight
+        flight = _read(problem, scaled, x, _seek_full_burn(scaled, vehicle, x))
+        if flight is not None and flight.broken != ALTITUDE:
+            return flight
+    x = blank_extremal()
+    return _read(problem, scaled, x, _seek_touching(scaled, vehicle, x)) or flight
 
 
 def fly_to(problem: LandingProblem, x: Extremal, size: int) -> PrimerFlight | None:
@@ -157,6 +164,12 @@ def _seek(problem: PrimerProblem, vehicle: _Vehicle, time: float, x: Extremal) -
     if solve_primer(problem, x) and (math.isnan(time) or solve_primer_at(time, problem, x)):
         return judge_extremal(x, problem, *vehicle)
     return _NOT_FOUND
+
+
+@compile_kernel
+def _seek_full_burn(problem: PrimerProblem, vehicle: _Vehicle, x: Extremal) -> int:
+    """The same for the flight that burns all the way."""
+    return judge_extremal(x, problem, *vehicle) if solve_full_burn(problem, x) else _NOT_FOUND
 
 
 @compile_kernel

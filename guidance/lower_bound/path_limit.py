@@ -80,6 +80,34 @@ def _kinked_basis(time: float, normal: Array) -> Array:
 
 
 @compile_kernel
+def follow_kink(
+    known: Array, later: float, time: float, case: DualCase, tolerance: float, enough: float
+) -> Ascent:
+    """The best primer of a time of flight whose limit binds as long after the start as that of another time.
+
+    Args:
+        known: primer of ten numbers with a limit on the path.
+        later: [s] how much longer the flight is than that of the known one.
+        time: [s] of flight.
+        case: the relaxed problem.
+        tolerance: [m/s] as of `ascend`.
+        enough: [m/s] as of `ascend`.
+    """
+    start, normal = known.copy(), known[AFFINE:THETA].copy()
+    start[THETA] = min(max(known[THETA] + later, 0.0), time)
+    normal /= math.sqrt(dot(normal, normal))
+    return ascend(start, _kinked_basis(time, normal), time, case, tolerance, enough)
+
+
+@compile_kernel
+def has_kink(primer: Array) -> bool:
+    """Whether a primer uses a limit on the path."""
+    if primer.size == AFFINE:
+        return False
+    return primer[AFFINE] != 0.0 or primer[AFFINE + 1] != 0.0 or primer[AFFINE + 2] != 0.0
+
+
+@compile_kernel
 def keep_path(found: Ascent, time: float, case: DualCase, tolerance: float, enough: float) -> Ascent:
     """Raise the bound of one time of flight by the limit on the path.
 

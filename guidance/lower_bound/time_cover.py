@@ -17,7 +17,7 @@ from guidance.kernel import compile_kernel
 from guidance.lower_bound.dual_ascent import Ascent, affine_basis, ascend, dual_value, two_impulse_primer
 from guidance.lower_bound.dual_case import DualCase
 from guidance.lower_bound.dual_function import AFFINE, THETA, linear_part, sweep_bound
-from guidance.lower_bound.path_limit import PRIMER_SIZE, keep_path, widen_primer
+from guidance.lower_bound.path_limit import PRIMER_SIZE, follow_kink, has_kink, keep_path, widen_primer
 
 _FIRST_STRIDE = 5e-3  # of the time of flight
 _NUDGE = 0.03  # towards the primer of two impulses: one that is best at another time may lie on a kink of D
@@ -97,12 +97,18 @@ def last_primer(case: DualCase, time: float) -> Array:
 
 
 @compile_kernel
-def best_primer(known: Array, time: float, case: DualCase, aim: CoverAim) -> Ascent:
+def best_primer(known: Array, later: float, time: float, case: DualCase, aim: CoverAim) -> Ascent:
     """The best primer of a time, of ten numbers, from one that is known or from that of two impulses.
 
     Where no ascent gets that far it is that of two impulses, whose bound is their velocity change. Where its
-    bound is less than the aim's target, a limit on the path may raise it.
+    bound is less than the aim's target, a limit on the path may raise it. The time is `later` [s] than that
+    of the known one: a limit that it uses is tried first.
     """
+    kinked = Ascent(widen_primer(known), -np.inf, True)
+    if has_kink(known):
+        kinked = follow_kink(known, later, time, case, 0.1 * aim.tolerance, 2.0 * aim.target)
+        if kinked.value >= aim.target or not kinked.stalled:
+            return kinked
     gradient, basis = np.empty(6), affine_basis(time)
     impulses = two_impulse_primer(time, case)
     second = _FIRST_SCALE * impulses
@@ -119,7 +125,8 @@ def best_primer(known: Array, time: float, case: DualCase, aim: CoverAim) -> Asc
         found = Ascent(impulses, least, True)
     if found.value > aim.target - aim.tolerance:
         return Ascent(widen_primer(found.primer), found.value, found.stalled)
-    return keep_path(found, time, case, 0.1 * aim.tolerance, 2.0 * aim.target)
+    kept = keep_path(found, time, case, 0.1 * aim.tolerance, 2.0 * aim.target)
+    return kinked if kinked.value > kept.value else kept
 
 
 @compile_kernel
@@ -206,6 +213,7 @@ def cover_times(times: Array, case: DualCase, start: Array, near: float, aim: Co
     """
     cells = times.size - 1
     primers, owner = np.empty((MOST_PRIMERS, PRIMER_SIZE)), np.zeros(cells, np.int64)
+    made_for = np.full(MOST_PRIMERS, near)
     envelope = np.full(cells, -np.inf)
     primers[0] = widen_primer(last_primer(case, times[-1]))
     primers[1] = widen_primer(along_change(case))
@@ -213,14 +221,14 @@ def cover_times(times: Array, case: DualCase, start: Array, near: float, aim: Co
         join_cover(primers[count], count, times, case, envelope, owner)
     level, best_time, best_value = aim.target, near, np.inf
     time, count, cell, again, stride = near, 2, -1, False, 0.0
-    known = widen_primer(start)
+    known, known_time = widen_primer(start), near
     while count < MOST_PRIMERS:
-        found = best_primer(known, time, case, aim)
+        found = best_primer(known, time - known_time, time, case, aim)
         better = found.value < best_value - aim.tolerance
         if found.value < best_value:
             best_value, best_time = found.value, time
             level = min(aim.target, best_value - aim.tolerance)
-        primers[count] = found.primer
+        primers[count], made_for[count] = found.primer, time
         join_cover(found.primer, count, times, case, envelope, owner)
         count += 1
         if best_value < aim.floor:
@@ -228,7 +236,7 @@ def cover_times(times: Array, case: DualCase, start: Array, near: float, aim: Co
         if better:
             stride = _next_stride(found, time, stride, case, aim.tolerance)
             if stride != 0.0 and times[1] < time + stride < times[-1]:
-                time, known = time + stride, found.primer
+                time, known, known_time = time + stride, found.primer, time
                 continue
         if again:  # the best primer of this cell is among them: more cannot be had of it
             level = min(level, envelope[cell])
@@ -237,6 +245,6 @@ def cover_times(times: Array, case: DualCase, start: Array, near: float, aim: Co
             break
         again = cell == cell_before
         time = _beyond(0.5 * (times[cell] + times[cell + 1]), best_time, again, times)
-        known = primers[owner[cell]]
+        known, known_time = primers[owner[cell]], made_for[owner[cell]]
     lowest_bound = min(float(np.min(envelope)), linear_part(primers[0], times[-1], case))
     return TimeCover(primers[:count].copy(), owner, lowest_bound, best_time, best_value)
