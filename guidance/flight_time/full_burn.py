@@ -1,9 +1,9 @@
 """Flights without a coast: full thrust from the start to the landing, along a primer affine in time.
 
 Where the switching function stays positive there is no coast, and least propellant is least time. Six
-equations, r(T) = target and v(T) = 0, go with six unknowns: the primer but for its scale, and T. The Hamiltonian
-vanishes, so that the switching function is p'.v - p.g over the thrust acceleration; it is least where |p| is.
-The flight is an extremal where it is positive there.
+equations, r(T) = target and v(T) = 0, go with six unknowns: the primer but for its scale, and T. The
+Hamiltonian vanishes, so that the switching function is p'.v - p.g over the thrust acceleration; it is least
+where |p| is. The flight is an extremal where it is positive there.
 
 An `Extremal` has a coast. That of such a flight lasts a hundred-millionth of it, where |p| is least.
 """

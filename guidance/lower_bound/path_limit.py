@@ -80,22 +80,17 @@ def _kinked_basis(time: float, normal: Array) -> Array:
 
 
 @compile_kernel
-def follow_kink(
-    known: Array, later: float, time: float, case: DualCase, tolerance: float, enough: float
-) -> Ascent:
-    """The best primer of a time of flight whose limit binds as long after the start as that of another time.
+def shift_kink(known: Array, later: float, time: float) -> Array:
+    """A primer for a flight of `time` that lasts `later` [s] more: its limit binds as long after the start."""
+    out = known.copy()
+    out[THETA] = min(max(known[THETA] + later, 0.0), time)
+    return out
 
-    Args:
-        known: primer of ten numbers with a limit on the path.
-        later: [s] how much longer the flight is than that of the known one.
-        time: [s] of flight.
-        case: the relaxed problem.
-        tolerance: [m/s] as of `ascend`.
-        enough: [m/s] as of `ascend`.
-    """
-    start, normal = known.copy(), known[AFFINE:THETA].copy()
-    start[THETA] = min(max(known[THETA] + later, 0.0), time)
-    normal /= math.sqrt(dot(normal, normal))
+
+@compile_kernel
+def ascend_with_kink(start: Array, time: float, case: DualCase, tolerance: float, enough: float) -> Ascent:
+    """The best primer of a time of flight [s] with the limit on the path that `start` uses; as `ascend`."""
+    normal = start[AFFINE:THETA] / math.sqrt(dot(start[AFFINE:THETA], start[AFFINE:THETA]))
     return ascend(start, _kinked_basis(time, normal), time, case, tolerance, enough)
 
 

@@ -22,14 +22,13 @@ from guidance.lower_bound.time_cover import (
     CoverAim,
     TimeCover,
     best_primer,
+    bound_at,
     claimed_bound,
     cover_times,
-    sweep_cells,
 )
 from guidance.lower_bound.time_grid import time_grid
 
 _CELLS = 240  # of the grid of times, up to the time to begin with
-_HAIR = 1e-9  # of one time of flight: the cell whose bound is that of this time
 _DECISIVE = 1e-8  # of the exhaust velocity: tolerance of a bound that shall lie above the tank's content
 _SCOPE = "every time of flight, in continuous time"
 _CAUSES = ("maximum thrust", "propellant")
@@ -145,11 +144,9 @@ def _bound_at(problem: LandingProblem, most: float, time: float) -> DualBound:
     case = dual_case(problem, most)
     aim = CoverAim(most, GAP_TOLERANCE * problem.lander.exhaust_velocity, -math.inf)
     found = best_primer(two_impulse_primer(time, case), 0.0, time, case, aim)
-    times = np.append(np.linspace(0.0, time, _CELLS + 1)[:-1], [time * (1.0 - _HAIR), time])
-    lowest = np.empty(times.size - 1)
-    sweep_cells(found.primer, times, case, lowest)
     pieces = (_piece(time, time, found.primer),)
-    return DualBound(problem, most, _claim(problem, lowest[-1], most), pieces, time, time)
+    level = bound_at(found.primer, time, case)
+    return DualBound(problem, most, _claim(problem, level, most), pieces, time, time)
 
 
 def _piece(begin: float, end: float, primer: Array) -> DualPiece:

@@ -17,11 +17,20 @@ from guidance.kernel import compile_kernel
 from guidance.lower_bound.dual_ascent import Ascent, affine_basis, ascend, dual_value, two_impulse_primer
 from guidance.lower_bound.dual_case import DualCase
 from guidance.lower_bound.dual_function import AFFINE, THETA, linear_part, sweep_bound
-from guidance.lower_bound.path_limit import PRIMER_SIZE, follow_kink, has_kink, keep_path, widen_primer
+from guidance.lower_bound.path_limit import (
+    PRIMER_SIZE,
+    ascend_with_kink,
+    has_kink,
+    keep_path,
+    shift_kink,
+    widen_primer,
+)
 
 _FIRST_STRIDE = 5e-3  # of the time of flight
 _NUDGE = 0.03  # towards the primer of two impulses: one that is best at another time may lie on a kink of D
 _FIRST_SCALE = 1.1  # of the primer of two impulses: longer than one, its thrust burns somewhere
+_FINE = 240  # cells of the grid of one time of flight
+_HAIR = 1e-9  # of one time of flight: the cell whose bound is that of this time
 _STRETCH = 1.7  # of the distance from the best time
 _NEARER = 1.0 - 1e-9  # than another cell: what lies further inside is rounding
 MOST_PRIMERS = 160
@@ -97,6 +106,25 @@ def last_primer(case: DualCase, time: float) -> Array:
 
 
 @compile_kernel
+def bound_at(primer: Array, time: float, case: DualCase) -> float:
+    """[m/s] D of a primer at one time of flight [s], on a grid on which a thrust that turns fast is seen."""
+    marks, lowest = np.empty(_FINE + 2), np.empty(_FINE + 1)
+    for k in range(_FINE):
+        marks[k] = time * k / _FINE
+    marks[_FINE], marks[_FINE + 1] = time * (1.0 - _HAIR), time
+    sweep_cells(primer, marks, case, lowest)
+    return float(lowest[_FINE])
+
+
+@compile_kernel
+def _follow_kink(start: Array, time: float, case: DualCase, aim: CoverAim) -> Ascent:
+    """The best primer with the limit of `start`, or that itself, whichever the finer grid says."""
+    found = ascend_with_kink(start, time, case, 0.1 * aim.tolerance, 2.0 * aim.target)
+    before, after = bound_at(start, time, case), bound_at(found.primer, time, case)
+    return Ascent(start, before, False) if before > after else Ascent(found.primer, after, found.stalled)
+
+
+@compile_kernel
 def best_primer(known: Array, later: float, time: float, case: DualCase, aim: CoverAim) -> Ascent:
     """The best primer of a time, of ten numbers, from one that is known or from that of two impulses.
 
@@ -106,8 +134,8 @@ def best_primer(known: Array, later: float, time: float, case: DualCase, aim: Co
     """
     kinked = Ascent(widen_primer(known), -np.inf, True)
     if has_kink(known):
-        kinked = follow_kink(known, later, time, case, 0.1 * aim.tolerance, 2.0 * aim.target)
-        if kinked.value >= aim.target or not kinked.stalled:
+        kinked = _follow_kink(shift_kink(known, later, time), time, case, aim)
+        if kinked.value > aim.target - aim.tolerance:
             return kinked
     gradient, basis = np.empty(6), affine_basis(time)
     impulses = two_impulse_primer(time, case)
@@ -245,6 +273,6 @@ def cover_times(times: Array, case: DualCase, start: Array, near: float, aim: Co
             break
         again = cell == cell_before
         time = _beyond(0.5 * (times[cell] + times[cell + 1]), best_time, again, times)
-        known, known_time = primers[owner[cell]], made_for[owner[cell]]
+        known, known_time = primers[owner[cell]], float(made_for[owner[cell]])
     lowest_bound = min(float(np.min(envelope)), linear_part(primers[0], times[-1], case))
     return TimeCover(primers[:count].copy(), owner, lowest_bound, best_time, best_value)
