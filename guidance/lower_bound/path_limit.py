@@ -81,7 +81,7 @@ def _kinked_basis(time: float, normal: Array) -> Array:
 
 @compile_kernel
 def shift_kink(known: Array, later: float, time: float) -> Array:
-    """A primer for a flight of `time` that lasts `later` [s] more: its limit binds as long after the start."""
+    """A primer for a flight of `time` [s], `later` [s] more: its limit binds as long after the start."""
     out = known.copy()
     out[THETA] = min(max(known[THETA] + later, 0.0), time)
     return out

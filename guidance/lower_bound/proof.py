@@ -117,6 +117,8 @@ def _bound_above_tank(
             return _bound_by_cover(problem, most, times, cover)
     aim = CoverAim(target, _DECISIVE * exhaust, target)
     times, cover = _cover(problem, most, time, flight, aim)
+    if cover.level < target <= cover.best_value and flight is not None:  # a kink may lead the search astray
+        times, cover = _cover(problem, most, time, None, aim)
     return _bound_by_cover(problem, most, times, cover) if cover.level >= target else None
 
 
