@@ -44,8 +44,6 @@ _MOST_STEPS = 30
 _CONVERGED = 1e-10  # largest residual, non-dimensional: a micrometre on the paper's descents
 LEAST_PULL, MOST_PULL = 1e-6, 0.98
 """Between these lies the square of gravity over full thrust per start mass."""
-_EASED, _EASE = 8, 0.06  # starts that sink less, tried for a touch of the ground; from one to the next
-_SMALLEST_EASE = 1e-3
 ANGLES = 4
 """Of the numbers of a step: two for each primer; three times follow, then those of a touch."""
 FREE, TOUCHING = 7, 9
@@ -272,44 +270,6 @@ def solve_touching(problem: PrimerProblem, x: Extremal) -> bool:
         Whether it was found, and the ground bends its primer as it may: upward.
     """
     pull = problem.gravity
-    if not LEAST_PULL < dot(pull, pull) < MOST_PULL or not problem.velocity[2] < 0.0:
+    if not LEAST_PULL < dot(pull, pull) < MOST_PULL or not guess_touch(problem, x):
         return False
-    found = guess_touch(problem, x) and solve_from(x, problem, TOUCHING)
-    return (found or _follow_sink(problem, x)) and x.touch[1] > 0.0
-
-
-@compile_kernel
-def _with_sink(problem: PrimerProblem, share: float) -> PrimerProblem:
-    """A problem whose start sinks at a share of its rate."""
-    r, v, g, flow = problem
-    slower = v.copy()
-    slower[2] = share * v[2]
-    return PrimerProblem(r, slower, g, flow)
-
-
-@compile_kernel
-def _follow_sink(problem: PrimerProblem, x: Extremal) -> bool:
-    """Find an extremal that touches the ground from that of a start that sinks less, in steps; x is the answer.
-
-    Of a start that can hardly stop above the ground no first guess is near enough.
-    """
-    share, kept = 1.0, new_extremal()
-    for number in range(1, _EASED + 1):
-        eased = _with_sink(problem, 1.0 - _EASE * number)
-        if guess_touch(eased, x) and solve_from(x, eased, TOUCHING):
-            share = 1.0 - _EASE * number
-            break
-    step = 1.0 - share
-    for _ in range(_MOST_STEPS):
-        if not step > _SMALLEST_EASE:
-            return False
-        copy_extremal(x, kept)
-        trial = min(share + step, 1.0)
-        if solve_from(x, _with_sink(problem, trial), TOUCHING):
-            if trial == 1.0:
-                return True
-            share, step = trial, 1.5 * step
-        else:
-            copy_extremal(kept, x)
-            step *= 0.5
-    return False
+    return solve_from(x, problem, TOUCHING) and x.touch[1] > 0.0
