@@ -73,7 +73,7 @@ def solve_pdg(
             'cvxpy' (the same problem, for reading) or 'casadi' (the unrelaxed nonconvex problem by fatrop or
             IPOPT).
         unreachable: what to do where the target is out of reach: 'raise', or plan to the softly reachable
-            point 'nearest' to it in its plane (always by the convex method).
+            point 'nearest' to it in its plane (by 'auto' from the indirect method, else the convex one).
         landing_error_weight: [kg/m] minimise propellant + weight x landing error, with a landing point that
             is free in the target's plane; by 'auto', 'convex' or 'casadi'. None lands at the target.
         guess: an earlier Plan of nearly the same flight, for a search that the indirect method cannot start.
