@@ -46,48 +46,31 @@ def fix_site(memory: FilterMemory, reading: Array, deviation: float, gate: float
 
 
 @compile_kernel
-def _replace_site(memory: FilterMemory, origin: int, offset: Array, variance: float) -> None:
-    """Put the site at `offset`, a vector along the body's axes, from the estimate that begins at `origin`."""
-    mean, covariance, _ = memory
-    turned = cross_matrix(offset)
+def acquire_site(memory: FilterMemory, reading: Array, deviation: float) -> None:
+    """Put a site into the filter where a look sees it, `reading` [m] shape (3,) from the vehicle.
+
+    Its error is that of the vehicle's position, of the attitude, and the look's own, `deviation` [m].
+    """
+    mean, covariance, rejections = memory
+    turned = cross_matrix(reading)
     rows = np.empty((3, SIZE))
-    for axis in range(3):
+    for i in range(3):
         for j in range(SIZE):
-            rows[axis, j] = covariance[origin + axis, j]
+            rows[i, j] = covariance[POSITION + i, j]
             for k in range(3):
-                rows[axis, j] -= turned[axis, k] * covariance[TILT + k, j]
-    block = np.empty((3, 3))
+                rows[i, j] -= turned[i, k] * covariance[TILT + k, j]
+    block = rows[:, POSITION : POSITION + 3].copy()
     for i in range(3):
         for j in range(3):
-            block[i, j] = rows[i, origin + j]
             for k in range(3):
                 block[i, j] -= rows[i, TILT + k] * turned[j, k]
-    moved = mean[origin : origin + 3] + offset
     for i in range(3):
-        mean[SITE + i] = moved[i]
+        mean[SITE + i] = mean[POSITION + i] + reading[i]
         for j in range(SIZE):
             covariance[SITE + i, j] = rows[i, j]
             covariance[j, SITE + i] = rows[i, j]
     for i in range(3):
         for j in range(3):
             covariance[SITE + i, SITE + j] = 0.5 * (block[i, j] + block[j, i])
-        covariance[SITE + i, SITE + i] += variance
-    memory.rejections[SITE_FIX] = 0
-
-
-@compile_kernel
-def acquire_site(memory: FilterMemory, reading: Array, deviation: float) -> None:
-    """Put a site into the filter where a look sees it, `reading` [m] shape (3,) from the vehicle.
-
-    Its error is that of the vehicle's position, of the attitude, and the look's own, `deviation` [m].
-    """
-    _replace_site(memory, POSITION, reading, deviation * deviation)
-
-
-@compile_kernel
-def move_site(memory: FilterMemory, offset: Array, deviation: float) -> None:
-    """Change the site for another, `offset` [m] shape (3,) from it on the same look's map.
-
-    Its error is that of the old site, of the attitude, and the map's own, `deviation` [m].
-    """
-    _replace_site(memory, SITE, offset, deviation * deviation)
+        covariance[SITE + i, SITE + i] += deviation * deviation
+    rejections[SITE_FIX] = 0

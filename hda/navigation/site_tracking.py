@@ -7,11 +7,11 @@ from numpy.typing import ArrayLike
 
 from guidance.arrays import Array
 from guidance.validation import finite_vector
-from hda.navigation.layout import SITE_FIX, FilterMemory
+from hda.navigation.layout import SITE, SITE_FIX, FilterMemory
 from hda.navigation.navigation_state import NavigationState
 from hda.navigation.sensor_errors import FixDraws
 from hda.navigation.sensors import SiteFixes
-from hda.navigation.site_fixes import acquire_site, fix_site, measure_site, move_site
+from hda.navigation.site_fixes import acquire_site, fix_site, measure_site
 from hda.navigation.system import NavigationSystem
 
 _FIRST_LOOK = SiteFixes()
@@ -63,19 +63,22 @@ def track_site(
 
 
 def choose_site(navigation: NavigationState, offset: ArrayLike, deviation: float = 0.0) -> NavigationState:
-    """Change the tracked site for another on the map of the same look.
+    """Change the tracked site for another on the map that the looks made.
+
+    The map hangs on the old site, so the new one takes over its error.
 
     Args:
         navigation: the filter.
-        offset: [m] shape (3,), new less old site, as the vehicle believes.
-        deviation: [m] one sigma of the error of the map over this distance along each axis, without that
-            of the attitude.
+        offset: [m] shape (3,), new less old site on the map.
+        deviation: [m] one sigma, along each axis, of the map's error over this distance.
 
     Raises:
         ValueError: the offset is not three finite numbers.
     """
     memory = navigation.memory()
-    move_site(memory, finite_vector("offset", offset, 3), deviation)
+    memory.mean[SITE : SITE + 3] += finite_vector("offset", offset, 3)
+    for axis in range(SITE, SITE + 3):
+        memory.covariance[axis, axis] += deviation**2
     return _close(navigation, memory)
 
 
