@@ -16,6 +16,10 @@ if TYPE_CHECKING:
     from hda.flight.touchdown_report import TouchdownFault, TouchdownReport
     from hda.ground.library import SPLITS, Ground, load_tile, prepare_tiles
     from hda.ground.tile import Tile, make_tile
+    from hda.navigation.filter import navigate
+    from hda.navigation.navigation_state import NavigationState, begin_navigation
+    from hda.navigation.sensors import Altimeter, InertialUnit, SiteFixes, TerrainFixes, Velocimeter
+    from hda.navigation.system import NavigationSystem
     from hda.policies.entry import PolicyEntry
     from hda.policy import Decision, DecisionStatus, Policy, PrivilegedPolicy, ZemZevCommand
     from hda.registry import make_policy, policy_names, register_policy
@@ -39,6 +43,10 @@ _HOMES = {
     "hda.flight.touchdown_report": ("TouchdownFault", "TouchdownReport"),
     "hda.ground.library": ("SPLITS", "Ground", "load_tile", "prepare_tiles"),
     "hda.ground.tile": ("Tile", "make_tile"),
+    "hda.navigation.filter": ("navigate",),
+    "hda.navigation.navigation_state": ("NavigationState", "begin_navigation"),
+    "hda.navigation.sensors": ("Altimeter", "InertialUnit", "SiteFixes", "TerrainFixes", "Velocimeter"),
+    "hda.navigation.system": ("NavigationSystem",),
     "hda.policies.entry": ("PolicyEntry",),
     "hda.policy": ("Decision", "DecisionStatus", "Policy", "PrivilegedPolicy", "ZemZevCommand"),
     "hda.registry": ("make_policy", "policy_names", "register_policy"),
@@ -61,13 +69,17 @@ __all__ = [
     "PRESETS",
     "SPLITS",
     "TESTED_LIMITS",
+    "Altimeter",
     "Decision",
     "DecisionStatus",
     "Ending",
     "EpisodeRecord",
     "Ground",
     "GroundTouchdown",
+    "InertialUnit",
     "Lidar",
+    "NavigationState",
+    "NavigationSystem",
     "Observation",
     "Outcome",
     "PlaneTouchdown",
@@ -81,19 +93,24 @@ __all__ = [
     "SafetyMap",
     "Scenario",
     "ScenarioView",
+    "SiteFixes",
     "StartConditions",
+    "TerrainFixes",
     "TerrainParameters",
     "Tile",
     "TouchdownFault",
     "TouchdownLimits",
     "TouchdownReport",
+    "Velocimeter",
     "ZemZevCommand",
     "assess_safety",
+    "begin_navigation",
     "fly",
     "generate_terrain",
     "load_tile",
     "make_policy",
     "make_tile",
+    "navigate",
     "place_preset",
     "policy_names",
     "prepare_tiles",

@@ -1,8 +1,8 @@
 """Common random numbers: what chance does to an episode, whatever the policy does.
 
-`SeedSequence([study_seed, episode]).spawn(4)` gives the scenario, sensor, actuator and policy streams. Look k
-and interval k draw from children of their own, keyed by k, so that two policies that fly the same episode
-meet the same noise at the same look, even if one of them draws more or flies longer.
+`SeedSequence([study_seed, episode]).spawn(5)` gives the scenario, sensor, actuator, policy and navigation
+streams. Look k and interval k draw from children of their own, keyed by k, so that two policies that fly the
+same episode meet the same noise at the same look, even if one of them draws more or flies longer.
 
 SeedSequence reads a number as words of 32 bits, and pads two words with two zeros. A study seed of more words
 would run into the episode's: (2^32, 0) into (0, 1). It is therefore given as its first word, the episode, how
@@ -18,16 +18,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from guidance.arrays import Array
+from hda.navigation.sensor_errors import FixDraws, ReadingDraws, draw_fix, draw_readings
 from hda.sensing.ranging import ScanDraws, draw_scan
 from hda.task.look_noise import POOL, draw_normals
 
-_SCENARIO, _SENSOR, _ACTUATOR, _POLICY = range(4)
+_SCENARIO, _SENSOR, _ACTUATOR, _POLICY, _NAVIGATION = range(5)
 _WORD = 2**32
 
 
 @dataclass(frozen=True)
 class EpisodeStreams:
-    """The four random streams of one episode.
+    """The random streams of one episode.
 
     Attributes:
         study_seed: seed of the whole study, at least zero; of any size.
@@ -83,6 +84,18 @@ class EpisodeStreams:
         """Error of the estimated position [m] and velocity [m/s], shape (6,), one for the whole episode."""
         draw = self._generator(_SENSOR).standard_normal(6)
         return draw * np.repeat((position_error, velocity_error), 3)
+
+    def navigation(self) -> np.random.Generator:
+        """Stream of what errs for a whole episode in the navigation sensors."""
+        return self._generator(_NAVIGATION)
+
+    def readings(self, index: int, periods: int) -> ReadingDraws:
+        """All that chance does to the navigation sensors over the control periods of interval `index`."""
+        return draw_readings(self._generator(_NAVIGATION, index), periods)
+
+    def site_fix(self, index: int) -> FixDraws:
+        """All that chance does to the fix of the landing site in look `index`."""
+        return draw_fix(self._generator(_NAVIGATION, index, 0))
 
     def map_is_missing(self, index: int, probability: float) -> bool:
         """Whether look `index` comes without a map."""

@@ -9,12 +9,12 @@ from hda.task.random_streams import EpisodeStreams
 
 SEEDS = st.integers(0, 2**32 - 1)
 EPISODES = st.integers(0, 100_000)
-SCENARIO, SENSOR, ACTUATOR, POLICY = range(4)
+SCENARIO, SENSOR, ACTUATOR, POLICY, NAVIGATION = range(5)
 
 
 def spawned(study_seed: int, episode: int, stream: int, *child: int) -> np.random.Generator:
     """The generator of a stream, made by spawning alone."""
-    sequence = np.random.SeedSequence([study_seed, episode]).spawn(4)[stream]
+    sequence = np.random.SeedSequence([study_seed, episode]).spawn(5)[stream]
     for k in child:
         sequence = sequence.spawn(k + 1)[k]
     return np.random.default_rng(sequence)
@@ -30,6 +30,12 @@ def test_streams_are_the_spawned_children_of_seed_and_episode(seed, episode, k):
     np.testing.assert_array_equal(streams.look(k, 64), noise)
     error = spawned(seed, episode, ACTUATOR, k).uniform(-0.05, 0.05)
     assert streams.thrust_error(k, 0.05) == error
+    navigation = spawned(seed, episode, NAVIGATION)
+    assert streams.navigation().standard_normal(16).tolist() == navigation.standard_normal(16).tolist()
+    readings = spawned(seed, episode, NAVIGATION, k)
+    assert streams.readings(k, 10).normal.tolist() == readings.standard_normal((10, 16)).tolist()
+    fix = spawned(seed, episode, NAVIGATION, k, 0)
+    assert streams.site_fix(k).normal.tolist() == fix.standard_normal(3).tolist()
 
 
 def test_millions_of_values_of_looks_are_numpys_to_the_bit():
@@ -73,6 +79,9 @@ def test_every_stream_and_every_child_is_different():
             firsts += [streams.scenario().uniform(-1, 1), streams.policy().uniform(-1, 1)]
             firsts += [streams.thrust_error(k, 1.0) for k in range(20)]
             firsts += [spawned(seed, episode, SENSOR, k).uniform(-1, 1) for k in range(20)]
+            firsts += [float(streams.navigation().standard_normal())]
+            firsts += [float(streams.readings(k, 1).normal[0, 0]) for k in range(20)]
+            firsts += [float(streams.site_fix(k).normal[0]) for k in range(20)]
             looks = [streams.look(k, 2).tobytes() for k in range(20)]
             assert len(set(looks)) == 20
     assert len(set(firsts)) == len(firsts)

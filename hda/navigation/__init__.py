@@ -1,0 +1,72 @@
+"""Where the lander believes it is: its navigation sensors, and the filter that makes an estimate of them.
+
+`sensors` and `system` say what is aboard, `sensor_errors` what chance does to it. `navigation_state` is what
+the filter knows, `filter` takes it along a flight, `site_tracking` puts the landing site into it. The other
+modules are their kernels: `layout` names the numbers, `propagation` is the inertial unit, `readings` and
+`site_fixes` are the other sensors, `schmidt_update` takes a measurement in, `control_period` is what the
+vehicle calls. It sees the ground by `hda.sensing`; the task and the simulator import it.
+"""
+
+from typing import TYPE_CHECKING
+
+from guidance.exports import lazy_exports
+
+if TYPE_CHECKING:
+    from hda.navigation.filter import NavigationLog, measure_ranges, navigate
+    from hda.navigation.navigation_state import NavigationState, begin_navigation
+    from hda.navigation.sensor_errors import (
+        FixDraws,
+        ReadingDraws,
+        SensorErrors,
+        draw_fix,
+        draw_readings,
+        draw_sensor_errors,
+    )
+    from hda.navigation.sensors import Altimeter, InertialUnit, SiteFixes, TerrainFixes, Velocimeter
+    from hda.navigation.site_tracking import choose_site, find_site, track_site
+    from hda.navigation.system import NAVIGATION_FAULTS, NavigationSystem, add_fault
+
+_HOMES = {
+    "hda.navigation.filter": ("NavigationLog", "measure_ranges", "navigate"),
+    "hda.navigation.navigation_state": ("NavigationState", "begin_navigation"),
+    "hda.navigation.sensor_errors": (
+        "FixDraws",
+        "ReadingDraws",
+        "SensorErrors",
+        "draw_fix",
+        "draw_readings",
+        "draw_sensor_errors",
+    ),
+    "hda.navigation.sensors": ("Altimeter", "InertialUnit", "SiteFixes", "TerrainFixes", "Velocimeter"),
+    "hda.navigation.site_tracking": ("choose_site", "find_site", "track_site"),
+    "hda.navigation.system": ("NAVIGATION_FAULTS", "NavigationSystem", "add_fault"),
+}
+
+__all__ = [
+    "NAVIGATION_FAULTS",
+    "Altimeter",
+    "FixDraws",
+    "InertialUnit",
+    "NavigationLog",
+    "NavigationState",
+    "NavigationSystem",
+    "ReadingDraws",
+    "SensorErrors",
+    "SiteFixes",
+    "TerrainFixes",
+    "Velocimeter",
+    "add_fault",
+    "begin_navigation",
+    "choose_site",
+    "draw_fix",
+    "draw_readings",
+    "draw_sensor_errors",
+    "find_site",
+    "measure_ranges",
+    "navigate",
+    "track_site",
+]
+
+__getattr__, __dir__ = lazy_exports(
+    __name__, {name: home for home, names in _HOMES.items() for name in names}
+)

@@ -1,0 +1,101 @@
+"""The lander's navigation filter along a flight: one value in, the next one out.
+
+A dual-state filter, of the vehicle and of the landing site together (Crain and Bishop, NTRS 20170009198), in
+three dimensions of translation. `hda.navigation.layout` says what it estimates and what it only considers.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from guidance.arrays import Array
+from guidance.constants import MOON_GRAVITY
+from guidance.validation import finite_vector
+from hda.navigation.control_period import navigate_path, range_down
+from hda.navigation.layout import ESTIMATED, SIZE, TrueErrors
+from hda.navigation.navigation_state import NavigationState
+from hda.navigation.sensor_errors import ReadingDraws, SensorErrors
+from hda.navigation.system import NavigationSystem
+
+
+@dataclass(frozen=True, eq=False)
+class NavigationLog:
+    """The filter after each of n control periods.
+
+    Attributes:
+        estimate: shape (n, 13).
+        covariance: shape (n, 20, 20).
+        innovation_square: shape (n, 3), of altimeter (1 degree of freedom), velocimeter (3) and terrain fix
+            (3), in units of its predicted covariance; NaN where there was no reading.
+    """
+
+    estimate: Array
+    covariance: Array
+    innovation_square: Array
+
+
+def measure_ranges(elevation: NDArray[np.float32], path: Array, errors: SensorErrors) -> Array:
+    """[m] true ranges down to the ground, NaN where none is known.
+
+    Args:
+        elevation: [m] shape (rows, columns), the true ground at 1 m a cell; row 0 is the south edge.
+        path: shape (n, 7) or (n, 3), true positions first.
+        errors: the tilt turns the beam.
+
+    Returns:
+        Shape (n,).
+    """
+    top = float(np.nanmax(elevation))
+    return np.array([range_down(elevation, row[:3].copy(), errors.tilt, top) for row in path])
+
+
+def navigate(
+    system: NavigationSystem,
+    navigation: NavigationState,
+    flown: tuple[Array, Array, Array],
+    draws: ReadingDraws,
+    gravity: ArrayLike = MOON_GRAVITY,
+) -> tuple[NavigationState, NavigationLog]:
+    """Take the filter along a flown path.
+
+    Args:
+        system: sensors and filter.
+        navigation: the filter at the path's first node.
+        flown: times of n control instants [s] shape (n,), true states there (x y z vx vy vz m) shape (n, 7),
+            and ranges down [m] at the nodes after the first, shape (n - 1,), NaN where there is no ground.
+        draws: for at least n - 1 periods.
+        gravity: [m/s^2] shape (3,).
+
+    Returns:
+        The filter at the path's last node, and what it went through.
+
+    Raises:
+        ValueError: the shapes do not fit one another, or there are too few draws.
+    """
+    time, path, heights = flown
+    periods = time.size - 1
+    if periods < 1 or path.shape != (periods + 1, 7) or heights.shape != (periods,):
+        raise ValueError(f"flown: shapes {time.shape}, {path.shape} and {heights.shape} do not fit together")
+    if draws.normal.shape[0] < periods:
+        raise ValueError(f"draws must be for {periods} periods, got {draws.normal.shape[0]}")
+    memory, before = navigation.memory(), navigation.errors
+    errors = TrueErrors(
+        before.accelerometer_bias.copy(), before.altimeter_bias, before.beam_bias, before.tilt
+    )
+    log = NavigationLog(
+        np.empty((periods, ESTIMATED)), np.empty((periods, SIZE, SIZE)), np.empty((periods, 3))
+    )
+    navigate_path(
+        memory,
+        (time, path, heights, navigation.instant),
+        finite_vector("gravity", gravity, 3),
+        errors,
+        (draws.normal, draws.uniform),
+        system.numbers(float(time[1] - time[0])),
+        (log.estimate, log.covariance, log.innovation_square),
+    )
+    after = replace(before, accelerometer_bias=errors.accelerometer_bias)
+    return NavigationState(*memory, after, navigation.instant + periods), log
