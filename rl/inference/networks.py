@@ -78,10 +78,10 @@ def _connect(inputs: Array32, weight: Array32, bias: Array32, rectify: bool) -> 
     """Dense layer: inputs (in,), weight (in, out), bias (out,)."""
     out = bias.copy()
     for i in range(inputs.shape[0]):
-        value = inputs[i]
+        value, row = inputs[i], weight[i]
         if value != 0.0:
             for k in range(out.shape[0]):
-                out[k] += value * weight[i, k]
+                out[k] += value * row[k]
     if rectify:
         for k in range(out.shape[0]):
             out[k] = max(out[k], np.float32(0.0))
