@@ -1,7 +1,7 @@
 """What the landing problem of a rigid body is, and what its answer is.
 
 The problem, the flight on its nodes, the plan with its status, and the check that flies a plan in SI and
-measures every limit. Nothing here plans: every planner of rigid bodies may import this wing, and it imports none.
+measures every limit. Nothing here plans: every planner of rigid bodies may import this wing.
 """
 
 from typing import TYPE_CHECKING

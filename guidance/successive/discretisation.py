@@ -1,8 +1,8 @@
 """Motion over one interval and its derivatives, in scaled units: controls linear in time, multiple shooting.
 
 The variational equations go along with the motion by the classic Runge-Kutta method, for the derivatives by
-the state at the start, both controls and the duration of the interval (as in Szmuk and Acikmese, AIAA 2018-0617,
-with the duration of one interval in place of a common dilation).
+the state at the start, both controls and the duration of the interval (as in Szmuk and Acikmese, AIAA
+2018-0617, with the duration of one interval in place of a common dilation).
 """
 
 from __future__ import annotations

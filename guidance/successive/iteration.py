@@ -1,8 +1,8 @@
 """Successive convexification: programme after programme about the last flight, until nothing changes.
 
 A step is taken where the penalised objective falls by a share of what the programme promised, and the weight
-of the trust region follows that share (ratio test of Mao et al., IEEE CDC 2016). Near the motion the duals of the
-programme weigh departures from it in place of the penalty: so curvature does not stop long steps.
+of the trust region follows that share (ratio test of Mao et al., IEEE CDC 2016). Near the motion the duals
+of the programme weigh departures from it in place of the penalty: so curvature does not stop long steps.
 """
 
 from __future__ import annotations

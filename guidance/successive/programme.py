@@ -10,6 +10,7 @@ that it vanishes where the motion can be kept (Mao, Szmuk and Acikmese, IEEE CDC
 from __future__ import annotations
 
 import math
+
 import numpy as np
 
 from guidance.arrays import Array, Index

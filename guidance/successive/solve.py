@@ -42,8 +42,8 @@ def solve_pdg_6dof(
     """Plan a descent that ends upright and at rest, within the body's thrust, torque, rate and tilt limits.
 
     By successive convexification on Clarabel, with a virtual control, a penalised trust region and free time
-    of flight (Szmuk and Acikmese, AIAA 2018-0617), from the point mass's plan. It is a local method: an OPTIMAL
-    plan is a local optimum on its mesh, and `plan.relaxation_gap` says how far a better one can be.
+    of flight (Szmuk and Acikmese, AIAA 2018-0617), from the point mass's plan. It is a local method: an
+    OPTIMAL plan is a local optimum on its mesh, and `plan.relaxation_gap` bounds what a better one saves.
 
     Args:
         state: RigidState, or what `solve_pdg` takes, for a body that stands upright at rest, engine off.
