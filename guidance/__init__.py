@@ -16,7 +16,11 @@ if TYPE_CHECKING:
     from guidance.dynamics import propagate
     from guidance.lander import PAPER_LANDER, Lander
     from guidance.pdg.prepared import solve_pdg
+    from guidance.rigid_body.body import RigidBody
+    from guidance.rigid_body.state import RigidState
+    from guidance.rigid_descent.plan import RigidPlan
     from guidance.state import State
+    from guidance.successive.solve import solve_pdg_6dof
     from guidance.zem_zev import saturate_thrust, time_to_go, zem_zev_acceleration
 
 __all__ = [
@@ -31,11 +35,15 @@ __all__ = [
     "Limits",
     "Plan",
     "PlanStatus",
+    "RigidBody",
+    "RigidPlan",
+    "RigidState",
     "SolverFailedError",
     "State",
     "propagate",
     "saturate_thrust",
     "solve_pdg",
+    "solve_pdg_6dof",
     "solve_pdg_many",
     "time_to_go",
     "zem_zev_acceleration",
@@ -55,11 +63,15 @@ __getattr__, __dir__ = lazy_exports(
         "Limits": "guidance.descent.limits",
         "Plan": "guidance.descent.plan",
         "PlanStatus": "guidance.descent.plan",
+        "RigidBody": "guidance.rigid_body.body",
+        "RigidPlan": "guidance.rigid_descent.plan",
+        "RigidState": "guidance.rigid_body.state",
         "SolverFailedError": "guidance.descent.plan",
         "State": "guidance.state",
         "propagate": "guidance.dynamics",
         "saturate_thrust": "guidance.zem_zev",
         "solve_pdg": "guidance.pdg.prepared",
+        "solve_pdg_6dof": "guidance.successive.solve",
         "solve_pdg_many": "guidance.bulk.solve",
         "time_to_go": "guidance.zem_zev",
         "zem_zev_acceleration": "guidance.zem_zev",

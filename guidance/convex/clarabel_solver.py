@@ -46,7 +46,7 @@ _STATUSES = {
 
 @dataclass(frozen=True, eq=False)
 class ConicAnswer:
-    """Answer to: minimise q'x subject to A x + s = b, s in the cones.
+    """Answer to: minimise x'Px/2 + q'x subject to A x + s = b, s in the cones.
 
     Attributes:
         status: how the solve ended; `primal` means something only if SOLVED.
@@ -90,6 +90,7 @@ class ConicSolver:
         cones: tuple[tuple[str, int], ...],
         tolerance: float = DEFAULT_TOLERANCE,
         refine: bool = False,
+        curvature: Array | None = None,
     ) -> None:
         """Assemble from nominal numbers, and solve them once.
 
@@ -103,6 +104,7 @@ class ConicSolver:
             tolerance: gap and feasibility tolerance.
             refine: whether to refine each linear solve; it takes two fifths of the time, and well-scaled
                 problems end in the same place without it.
+            curvature: diagonal of P, shape (n,), at least zero; None for a linear cost.
 
         Raises:
             ValueError: the data do not fit together or are not finite.
@@ -129,6 +131,11 @@ class ConicSolver:
         for name in ("tol_gap_abs", "tol_gap_rel", "tol_feas"):
             setattr(settings, name, tolerance)
         quadratic = csc_matrix((cost.size, cost.size))
+        if curvature is not None:
+            if curvature.shape != cost.shape or not np.isfinite(curvature).all() or curvature.min() < 0.0:
+                raise ValueError("curvature must be finite, at least zero and of the shape of cost")
+            columns = np.arange(cost.size + 1)
+            quadratic = csc_matrix((curvature, columns[:-1], columns), shape=(cost.size, cost.size))
         self._solver = clarabel.DefaultSolver(quadratic, cost, matrix, bound, cone_list(cones), settings)
         self._solver.solve()
 
@@ -137,8 +144,10 @@ class ConicSolver:
             if array.shape != (size,) or not np.isfinite(array).all():
                 raise ValueError("conic data must be finite and of the assembled shape")
 
-    def solve(self, values: Array, bound: Array, cost: Array) -> ConicAnswer:
-        """Solve with new numbers: the stored entries of A in CSC order, b and q.
+    def solve(self, values: Array, bound: Array, cost: Array, curvature: Array | None = None) -> ConicAnswer:
+        """Solve with new numbers: the stored entries of A in CSC order, b and q, and the diagonal of P.
+
+        The curvature is kept where none is given; one may be given only where there was one from the start.
 
         No exception of the solver's comes through, panics included.
 
@@ -147,6 +156,8 @@ class ConicSolver:
         """
         self._check(values, bound, cost)
         try:
+            if curvature is not None:
+                self._solver.update(P=curvature)
             self._solver.update(A=values, b=bound, q=cost)
             solution = self._solver.solve()
             words = str(solution.status)

@@ -109,4 +109,5 @@ def fly_turn(turn: Array, mass: float, duration: float, body: RigidBody, loop: A
         fly_into(state, still, np.array([torque[k], torque[k]]), loop.period, numbers)
         error_into(state[6:10], wanted, error)
         angles[k + 1], rates[k + 1] = np.linalg.norm(error), np.linalg.norm(state[10:13])
-    return StepResponse(loop.period * np.arange(periods + 1), angles, rates, torque)
+    time = np.linspace(0.0, periods * loop.period, periods + 1)
+    return StepResponse(time, angles, rates, torque)

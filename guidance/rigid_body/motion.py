@@ -192,7 +192,8 @@ def fly_commands(
     Raises:
         ValueError: an argument is not finite or of the wrong shape, or all mass may be burnt.
     """
-    force = finite_vector("thrust", [0.0, 0.0, thrust] if np.ndim(thrust) == 0 else thrust, 3)
+    along = np.array([0.0, 0.0, 1.0])
+    force = finite_vector("thrust", np.asarray(thrust) * along if np.ndim(thrust) == 0 else thrust, 3)
     couple = finite_vector("torque", torque, 3)
     time = finite_number("duration", duration, above=0.0)
     numbers = body.numbers(gravity)

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import control
 import numpy as np
@@ -75,7 +76,7 @@ def test_a_small_step_follows_the_critically_damped_form(frequency, angle):
     np.testing.assert_allclose(response.angle, angle * np.exp(-phase) * (1.0 + phase), atol=0.005 * angle)
 
 
-def open_loop(loop: AttitudeLoop) -> control.TransferFunction:
+def open_loop(loop: AttitudeLoop) -> Any:
     """By python-control: a double integrator under a zero-order hold, its two states fed back."""
     plant = control.c2d(control.ss([[0, 1], [0, 0]], [[0], [1]], np.eye(2), np.zeros((2, 1))), loop.period)
     wn = loop.natural_frequency

@@ -1,0 +1,121 @@
+"""`solve_pdg_6dof`: the least-propellant descent of a body that must turn."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from guidance.constants import MOON_GRAVITY
+from guidance.descent.plan import InfeasibleError, Plan, PlanStatus, SolverFailedError
+from guidance.pdg import solve_pdg
+from guidance.rigid_body.body import DEFAULT_BODY, RigidBody
+from guidance.rigid_body.state import RigidState
+from guidance.rigid_descent.plan import RigidPlan
+from guidance.rigid_descent.problem import RigidLandingProblem
+from guidance.state import State
+from guidance.successive.first_guess import guess_flight
+from guidance.successive.iteration import Ending, iterate_programmes
+from guidance.successive.units import Iterate, RigidUnits
+from guidance.validation import finite_vector
+
+METHOD = "successive"
+DEFAULT_NODES = 31
+"""Nodes of a plan unless asked otherwise."""
+_FEWEST_NODES = 5
+
+
+def solve_pdg_6dof(
+    state: RigidState | State | Sequence[float] | np.ndarray,
+    target: ArrayLike,
+    body: RigidBody = DEFAULT_BODY,
+    *,
+    gravity: ArrayLike = MOON_GRAVITY,
+    target_velocity: ArrayLike = (0.0, 0.0, 0.0),
+    glide_slope_limit: float | None = None,
+    free_attitude: bool = False,
+    objective: str = "propellant",
+    nodes: int = DEFAULT_NODES,
+    throw: bool = True,
+) -> RigidPlan:
+    """Plan a descent that ends upright and at rest, within the body's thrust, torque, rate and tilt limits.
+
+    By successive convexification on Clarabel, with a virtual control, a penalised trust region and free time
+    of flight (Szmuk and Acikmese, AIAA 2018-0617), from the point mass's plan. It is a local method: an
+    OPTIMAL plan is a local optimum on its mesh, and `plan.relaxation_gap` bounds what a better one saves.
+
+    Args:
+        state: RigidState, or what `solve_pdg` takes, for a body that stands upright at rest, engine off.
+        target: [m] shape (3,), site frame; the trajectory never goes below its altitude.
+        body: the vehicle.
+        gravity: [m/s^2] shape (3,).
+        target_velocity: [m/s] shape (3,), at the target.
+        glide_slope_limit: [rad] greatest angle, seen from the target, between the vehicle and the z axis.
+        free_attitude: whether the attitude at the start is free.
+        objective: 'propellant', or 'time' for the shortest flight.
+        nodes: N, for N - 1 equal intervals.
+        throw: raise where there is no flight; otherwise return a plan that says why.
+
+    Returns:
+        A RigidPlan; an OPTIMAL one was flown open loop through the true motion and kept every limit.
+
+    Raises:
+        ValueError: an argument is out of range, not finite or of the wrong shape.
+        InfeasibleError: not even a point mass that turns at once has a flight; proved by
+            `error.plan.certificate`.
+        SolverFailedError: no flight was found, or the flight that was found does not keep its limits between
+            the nodes; nothing is proved. `error.plan` is the point mass's plan.
+    """
+    if isinstance(nodes, bool) or not isinstance(nodes, int | np.integer) or nodes < _FEWEST_NODES:
+        raise ValueError(f"nodes must be an integer of at least {_FEWEST_NODES}, got {nodes!r}")
+    problem = RigidLandingProblem(
+        RigidState.parse(state),
+        finite_vector("target", target, 3),
+        body,
+        finite_vector("gravity", gravity, 3),
+        finite_vector("target_velocity", target_velocity, 3),
+        glide_slope_limit,
+        free_attitude,
+        objective,
+    )
+    plan = _plan(problem, int(nodes))
+    if throw and not plan.status.has_flight:
+        assert plan.point_mass is not None
+        kind = InfeasibleError if plan.status is PlanStatus.INFEASIBLE else SolverFailedError
+        raise kind(f"{plan.status.value}: {plan.message}", plan.point_mass)
+    return plan
+
+
+def _plan(problem: RigidLandingProblem, nodes: int) -> RigidPlan:
+    point = problem.point_mass
+    easy = solve_pdg(
+        point.state,
+        point.target,
+        lander=point.lander,
+        gravity=point.gravity,
+        target_velocity=point.target_velocity,
+        limits=point.limits,
+        throw=False,
+    )
+    if not easy.status.has_flight:
+        words = f"the point mass has no plan ({easy.message})"
+        return RigidPlan(easy.status, problem, METHOD, message=words, point_mass=easy, solves=easy.solves)
+    units = RigidUnits.of(problem)
+    guess = Iterate.of_flight(guess_flight(problem, easy, nodes), problem, units)
+    return _judge(problem, units, iterate_programmes(problem, units, guess), easy)
+
+
+def _judge(problem: RigidLandingProblem, units: RigidUnits, ending: Ending, easy: Plan) -> RigidPlan:
+    """Fly what the iteration found, and say what it is."""
+    solves = easy.solves + ending.solves
+    if not ending.converged:
+        status = PlanStatus.SOLVER_FAILED if "Clarabel" in ending.words else PlanStatus.LIMIT_REACHED
+        return RigidPlan(status, problem, METHOD, message=ending.words, point_mass=easy, solves=solves)
+    flight = ending.iterate.flight(problem, units)
+    plan = RigidPlan(PlanStatus.OPTIMAL, problem, METHOD, flight, "optimal", easy, solves)
+    if plan.keeps_limits:
+        return plan
+    name, excess = max(plan.residuals.excess(problem).items(), key=lambda item: item[1])
+    words = f"flown, the plan leaves its limits: {name} {excess:.1f} times what is allowed; try more nodes"
+    return RigidPlan(PlanStatus.SOLVER_FAILED, problem, METHOD, message=words, point_mass=easy, solves=solves)
