@@ -91,7 +91,10 @@ def shift_kink(known: Array, later: float, time: float) -> Array:
 def ascend_with_kink(start: Array, time: float, case: DualCase, tolerance: float, enough: float) -> Ascent:
     """The best primer of a time of flight [s] with the limit on the path that `start` uses; as `ascend`."""
     normal = start[AFFINE:THETA] / math.sqrt(dot(start[AFFINE:THETA], start[AFFINE:THETA]))
-    return ascend(start, _kinked_basis(time, normal), time, case, tolerance, enough)
+    found = ascend(start, _kinked_basis(time, normal), time, case, tolerance, enough)
+    if not dot(found.primer[AFFINE:THETA], normal) > _LEAST_MULTIPLIER / time:
+        found.primer[AFFINE:THETA], found.primer[THETA] = 0.0, np.inf
+    return found
 
 
 @compile_kernel
