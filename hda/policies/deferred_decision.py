@@ -223,12 +223,13 @@ class DeferredDecisionPolicy:
     def _branch(
         self, landing: SoftLanding, candidates: Candidates, parting_time: float | None
     ) -> DeferredDecision:
-        """The programme, in the frame of the plan to the first candidate's gate."""
+        """The programme, in the frame of the plan to the first candidate's gate, and on its level."""
         assert landing.plan is not None
         gate = landing.plan.problem.target
+        across = (candidates.sites - candidates.sites[0]) * np.array([1.0, 1.0, 0.0])
         return plan_deferred(
             landing.plan.problem,
-            gate + (candidates.sites - candidates.sites[0]),
+            gate + across,
             self.options.budget,
             landing.plan.time_of_flight,
             TrunkOptions(self.options.nodes, candidates.chances, parting_time),

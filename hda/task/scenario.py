@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from guidance.arrays import Array
 from guidance.state import State
@@ -87,6 +88,13 @@ def ground_point(scenario: Scenario, site: Array) -> Array:
     error = scenario.navigation_error
     vertical = 0.0 if scenario.preset.stance is None else error[2]
     return site - np.array([error[0], error[1], vertical])
+
+
+def true_heights(scenario: Scenario, rows: NDArray[np.int_], columns: NDArray[np.int_]) -> Array:
+    """[m] shape (n,), where a landing on each cell ends: on the target plane, or on the true ground."""
+    if scenario.preset.stance is None:
+        return np.full(rows.size, float(scenario.nominal_target[2]))
+    return scenario.tile.elevation[rows, columns].astype(np.float64)
 
 
 def draw_state(target: Array, start: StartConditions, rng: np.random.Generator) -> State:

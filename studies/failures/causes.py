@@ -28,12 +28,12 @@ from hda.flight.episode import fly
 from hda.flight.outcome import Ending
 from hda.flight.record import EpisodeRecord
 from hda.flight.touchdown_report import TouchdownFault
-from hda.policies.privileged.knowable_ground import KnowableGround, true_heights
+from hda.policies.privileged.knowable_ground import KnowableGround
 from hda.sensing.lidar import Lidar
 from hda.sensing.ranging import RangingLidar
 from hda.task.observation import Observation
 from hda.task.presets import Preset
-from hda.task.scenario import Scenario, ground_point
+from hda.task.scenario import Scenario, ground_point, true_heights
 from studies.campaign.monte_carlo import Study
 
 SAFE_READING = 0.5

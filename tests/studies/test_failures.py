@@ -30,7 +30,7 @@ from studies.failures.causes import (
     read_pixels,
 )
 from studies.failures.command import Failures, read_study, show_failures
-from studies.failures.table import describe_failure
+from studies.failures.table import describe_failure, write_markdown
 
 HARD = PRESETS["hard"]
 
@@ -223,3 +223,20 @@ def test_a_wrong_folder_or_policy_is_named(flown: Path, tmp_path: Path) -> None:
         show_failures(Failures(flown, policies=("singel-divert",)))
     with pytest.raises(ValueError, match="most must be at least 1"):
         Failures(flown, most=0)
+
+
+def test_what_failed_at_touchdowns_on_real_ground_is_named_and_counted(tmp_path: Path) -> None:
+    found = [explain_failure(record) for record in failures("single-divert", PRESETS["lidar"], 30)]
+    assert found
+    for failure in found:
+        assert failure.faults
+        assert f"At the touchdown failed: {', '.join(failure.faults)}." in describe_failure(failure)
+    study = Study(PRESETS["lidar"], ("single-divert",), 30)
+    write_markdown(
+        tmp_path / "failures.md", study, {"single-divert": found}, {"single-divert": len(found)}, False
+    )
+    text = (tmp_path / "failures.md").read_text()
+    for fault in {fault for failure in found for fault in failure.faults}:
+        assert f"{sum(fault in failure.faults for failure in found)} x {fault}" in text
+    on_plane = [explain_failure(record) for record in failures("single-divert", HARD, 5)]
+    assert all(failure.faults == () for failure in on_plane)

@@ -38,7 +38,7 @@ from guidance.state import State
 from hda.sensing.ranging import RangingLidar
 from hda.site_selection import Site
 from hda.task.observation import ScenarioView
-from hda.task.scenario import Scenario, ground_point
+from hda.task.scenario import Scenario, ground_point, true_heights
 
 _SECTIONS = 18  # of each golden section
 _TIMES = 96  # times of flight tried
@@ -268,13 +268,6 @@ def first_ground(scenario: Scenario) -> KnowableGround:
     target = ground_point(scenario, scenario.nominal_target)
     width = preset.lidar.width(state.position, target)
     return KnowableGround(state, target, width, scenario.view, preset.rules.soft_speed)
-
-
-def true_heights(scenario: Scenario, rows: NDArray[np.int_], columns: NDArray[np.int_]) -> Array:
-    """[m] shape (n,), where a landing on each cell ends: on the target plane, or on the true ground."""
-    if scenario.preset.stance is None:
-        return np.full(rows.size, float(scenario.nominal_target[2]))
-    return scenario.tile.elevation[rows, columns].astype(np.float64)
 
 
 def could_have_landed(scenario: Scenario) -> bool:
