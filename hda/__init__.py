@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from hda.flight.episode import fly
     from hda.flight.outcome import Ending, Outcome
     from hda.flight.record import EpisodeRecord
+    from hda.flight.touchdown_report import TouchdownFault, TouchdownReport
     from hda.ground.library import SPLITS, Ground, load_tile, prepare_tiles
     from hda.ground.tile import Tile, make_tile
     from hda.navigation.filter import navigate
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from hda.registry import make_policy, policy_names, register_policy
     from hda.safety.criteria import SafetyCriteria
     from hda.safety.safety_map import SafetyMap, assess_safety
+    from hda.safety.touchdown_limits import DESIGN_LIMITS, TESTED_LIMITS, TouchdownLimits
     from hda.sensing.lidar import Lidar
     from hda.sensing.ranging import RangingLidar
     from hda.task.observation import Observation, ScenarioView
@@ -31,12 +33,14 @@ if TYPE_CHECKING:
     from hda.task.presets import PRESETS, Preset
     from hda.task.rules import Rules, StartConditions
     from hda.task.scenario import Scenario, sample_scenario
+    from hda.task.touchdown import GroundTouchdown, PlaneTouchdown
     from hda.terrain.generator import TerrainParameters, generate_terrain
 
 _HOMES = {
     "hda.flight.episode": ("fly",),
     "hda.flight.outcome": ("Ending", "Outcome"),
     "hda.flight.record": ("EpisodeRecord",),
+    "hda.flight.touchdown_report": ("TouchdownFault", "TouchdownReport"),
     "hda.ground.library": ("SPLITS", "Ground", "load_tile", "prepare_tiles"),
     "hda.ground.tile": ("Tile", "make_tile"),
     "hda.navigation.filter": ("navigate",),
@@ -48,6 +52,7 @@ _HOMES = {
     "hda.registry": ("make_policy", "policy_names", "register_policy"),
     "hda.safety.criteria": ("SafetyCriteria",),
     "hda.safety.safety_map": ("SafetyMap", "assess_safety"),
+    "hda.safety.touchdown_limits": ("DESIGN_LIMITS", "TESTED_LIMITS", "TouchdownLimits"),
     "hda.sensing.lidar": ("Lidar",),
     "hda.sensing.ranging": ("RangingLidar",),
     "hda.task.observation": ("Observation", "ScenarioView"),
@@ -55,24 +60,29 @@ _HOMES = {
     "hda.task.presets": ("PRESETS", "Preset"),
     "hda.task.rules": ("Rules", "StartConditions"),
     "hda.task.scenario": ("Scenario", "sample_scenario"),
+    "hda.task.touchdown": ("GroundTouchdown", "PlaneTouchdown"),
     "hda.terrain.generator": ("TerrainParameters", "generate_terrain"),
 }
 
 __all__ = [
+    "DESIGN_LIMITS",
     "PRESETS",
     "SPLITS",
+    "TESTED_LIMITS",
     "Altimeter",
     "Decision",
     "DecisionStatus",
     "Ending",
     "EpisodeRecord",
     "Ground",
+    "GroundTouchdown",
     "InertialUnit",
     "Lidar",
     "NavigationState",
     "NavigationSystem",
     "Observation",
     "Outcome",
+    "PlaneTouchdown",
     "Policy",
     "PolicyEntry",
     "Preset",
@@ -88,6 +98,9 @@ __all__ = [
     "TerrainFixes",
     "TerrainParameters",
     "Tile",
+    "TouchdownFault",
+    "TouchdownLimits",
+    "TouchdownReport",
     "Velocimeter",
     "ZemZevCommand",
     "assess_safety",

@@ -13,7 +13,8 @@ if TYPE_CHECKING:
     from hda.flight.episode_row import EpisodeRow, summarize_episode
     from hda.flight.outcome import Ending, Outcome
     from hda.flight.record import EpisodeRecord
-    from hda.flight.vehicle import FlightErrors, FlightStatus, Segment, fly_interval
+    from hda.flight.touchdown_report import TouchdownFault, TouchdownReport
+    from hda.flight.vehicle import FlightErrors, FlightStatus, Segment, fly_interval, fly_over
 
 _HOMES = {
     "hda.flight.episode": (
@@ -32,11 +33,16 @@ _HOMES = {
         "Outcome",
     ),
     "hda.flight.record": ("EpisodeRecord",),
+    "hda.flight.touchdown_report": (
+        "TouchdownFault",
+        "TouchdownReport",
+    ),
     "hda.flight.vehicle": (
         "FlightErrors",
         "FlightStatus",
         "Segment",
         "fly_interval",
+        "fly_over",
     ),
 }
 
@@ -48,11 +54,14 @@ __all__ = [
     "FlightStatus",
     "Outcome",
     "Segment",
+    "TouchdownFault",
+    "TouchdownReport",
     "advance",
     "begin_flight",
     "fly",
     "fly_interval",
     "fly_legs",
+    "fly_over",
     "observe",
     "summarize_episode",
 ]

@@ -18,13 +18,17 @@ from guidance.state import State
 from guidance.upright_time import upright_time_to_go
 from hda.flight.outcome import Contact, Outcome, RewardTerms, classify, score_step
 from hda.flight.record import EpisodeRecord
-from hda.flight.vehicle import ControlPeriods, FlightErrors, FlightStatus, Segment, fly_interval
+from hda.flight.touchdown_report import judge_touchdown
+from hda.flight.vehicle import ControlPeriods, FlightErrors, FlightStatus, Segment, Surroundings, fly_over
 from hda.policy import Decision, Memory, Policy, PrivilegedPolicy
+from hda.safety.touchdown_stance import Stance
 from hda.sensing.lidar import look
 from hda.sensing.measured_look import MeasuredGround, measure_ground
 from hda.sensing.ranging import RangingLidar, scan
 from hda.task.observation import Observation
 from hda.task.scenario import Scenario, estimated_state, ground_point
+
+_LATE = 0.5  # of a decision interval: with less time to go no height is changed any more
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +89,9 @@ def observe(scenario: Scenario, flight: Flight) -> Observation:
     position = flight.state.position
     aim = ground_point(scenario, flight.target)
     estimate, width = estimated_state(scenario, flight.state), lidar.width(position, aim)
-    ground = None
+    rules = scenario.preset.rules
+    late = flight.index > 0 and flight.time_to_go <= _LATE * rules.decision_interval
+    stance, ground = None if late else scenario.preset.stance, None
     if isinstance(lidar, RangingLidar):
         ground = _measure(scenario, lidar, flight, estimate)
         safety_map = ground.safety_map(flight.target, width, lidar.pixels)
@@ -96,14 +102,29 @@ def observe(scenario: Scenario, flight: Flight) -> Observation:
         safety_map = look(lidar, position, aim, scenario.tile.probability, noise)
     return Observation(
         index=flight.index,
-        time=flight.index * scenario.preset.rules.decision_interval,
+        time=flight.index * rules.decision_interval,
         state=estimate,
-        target=flight.target,
+        target=_measured_target(stance, flight, ground),
         safety_map=safety_map,
         width=width,
         time_to_go=flight.time_to_go,
         ground=ground,
+        stance=stance,
     )
+
+
+def _measured_target(stance: Stance | None, flight: Flight, ground: MeasuredGround | None) -> Array:
+    """The target at the height of this look's ground; as it was where sites keep the target's height.
+
+    After the first look an earlier height is kept where this one misses the ground of a pad.
+    """
+    target = flight.target
+    if stance is None or ground is None:
+        return target
+    height, pads = ground.site_height(stance, float(target[0]), float(target[1]))
+    if flight.index > 0 and pads < stance.pads.shape[0]:
+        return target
+    return np.array([target[0], target[1], height if pads > 0 else ground.middle_height(float(target[2]))])
 
 
 def _measure(scenario: Scenario, lidar: RangingLidar, flight: Flight, estimate: State) -> MeasuredGround:
@@ -123,21 +144,21 @@ def advance(scenario: Scenario, flight: Flight, decision: Decision) -> Step:
     """Fly a decision until the next look, the ground, or the end of the episode.
 
     Raises:
-        ValueError: the decision's site is not on the target plane.
+        ValueError: flights end on the target plane, and the decision's site is not on it.
     """
     preset = scenario.preset
     rules = preset.rules
     plane = scenario.nominal_target[2]
-    if abs(decision.site[2] - plane) > 1e-6:
+    if preset.stance is None and abs(decision.site[2] - plane) > 1e-6:
         raise ValueError(f"site must lie on the target plane z = {plane:g} m, got z = {decision.site[2]:g} m")
     position = flight.state.position
     aims = [ground_point(scenario, site) for site in (flight.target, decision.site)]
     slant = min(elevation_angle(position, aim) for aim in aims)
-    segment = fly_interval(
+    segment = fly_over(
         flight.state,
         decision,
         preset.lander,
-        np.array(preset.gravity),
+        Surroundings(np.array(preset.gravity), scenario.footing),
         ControlPeriods(rules.control_period, rules.control_periods),
         FlightErrors(
             scenario.streams.thrust_error(flight.index, rules.thrust_error), scenario.navigation_error
@@ -149,14 +170,21 @@ def advance(scenario: Scenario, flight: Flight, decision: Decision) -> Step:
     initial = scenario.initial_state
     outcome = None
     if landed or truncated:
-        contact = Contact(
-            landed=landed,
-            safe_cell=landed and scenario.tile.is_safe(after.state.position),
-            tank_empty=segment.status is FlightStatus.TANK_EMPTY,
-        )
+        contact = _meet_ground(scenario, segment, aims[1])
         outcome = classify(initial, after.state, aims[1], contact, preset.lander, rules)
     burnt = (flight.state.mass - after.state.mass) / (initial.mass - preset.lander.dry_mass)
     return Step(after, segment, outcome, truncated, score_step(burnt, outcome), slant)
+
+
+def _meet_ground(scenario: Scenario, segment: Segment, site: Array) -> Contact:
+    """How the flight's last segment met the plane or the ground; `site` is where it flew to."""
+    landed, final = segment.status is not FlightStatus.FLYING, segment.final_state
+    return Contact(
+        landed=landed,
+        safe_cell=landed and scenario.tile.is_safe(final.position),
+        tank_empty=segment.status is FlightStatus.TANK_EMPTY,
+        report=judge_touchdown(scenario, final, site, bool(segment.commanded[-1].any())) if landed else None,
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,7 +221,7 @@ def fly_legs(
         memory: before the first look.
 
     Raises:
-        ValueError: a decision's site is not on the target plane.
+        ValueError: flights end on the target plane, and a decision's site is not on it.
     """
     flight, ended = begin_flight(scenario), False
     while not ended:
@@ -235,7 +263,7 @@ def fly(policy: Policy[Any] | PrivilegedPolicy, scenario: Scenario) -> EpisodeRe
 
     Raises:
         ValueError: the policy returns something that is not (Decision, memory), or a site off the target
-            plane.
+            plane where flights end on it.
     """
     pilot = inform_pilot(policy, scenario)
 

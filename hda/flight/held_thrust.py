@@ -1,4 +1,4 @@
-"""Motion under a held thrust, with its events: the target plane and the empty tank.
+"""Motion under a held thrust, with its events: the target plane or the true ground, and the empty tank.
 
 Kernels on arrays, for the vehicle's inner loop; a state is seven numbers (x y z vx vy vz m).
 """
@@ -13,6 +13,8 @@ import numpy as np
 from guidance.arrays import Array
 from guidance.dynamics import propagate_into
 from guidance.kernel import compile_kernel
+from hda.flight.ground_contact import Motion, fall_to_ground, hold_over_ground
+from hda.safety.touchdown_stance import NO_GROUND, Footing
 
 FLYING, TOUCHDOWN, TANK_EMPTY = 0, 1, 2
 """Where a period leaves the vehicle: `hda.flight.vehicle.FlightStatus` as plain numbers."""
@@ -46,6 +48,7 @@ class FlightConditions(NamedTuple):
         vehicle: limits of the lander.
         thrust_error: relative error of the applied thrust.
         navigation_error: estimated minus true position [m] and velocity [m/s], shape (6,).
+        footing: the lander over the true ground; without ground the flight ends on the plane.
     """
 
     period: float
@@ -54,6 +57,7 @@ class FlightConditions(NamedTuple):
     vehicle: VehicleLimits
     thrust_error: float
     navigation_error: Array
+    footing: Footing = NO_GROUND
 
 
 @compile_kernel
@@ -94,9 +98,12 @@ def _hold(
     conditions: FlightConditions,
     out: Array,
 ) -> tuple[float, bool]:
-    """Hold a thrust for `duration`, or until the plane is crossed: (time flown, whether it was crossed)."""
+    """Hold a thrust for `duration`, or until the plane or the ground is met: (time flown, whether it was)."""
     gravity, plane = conditions.gravity, conditions.plane
     exhaust_velocity = conditions.vehicle.exhaust_velocity
+    if conditions.footing.elevation.size > 0:
+        motion = Motion(start, thrust, gravity, exhaust_velocity)
+        return hold_over_ground(motion, duration, conditions.footing, out)
     propagate_into(start, thrust, duration, gravity, exhaust_velocity, out)
     high = duration
     below = out[2] <= plane
@@ -134,6 +141,14 @@ def fall_to_plane(
 
 
 @compile_kernel
+def fall_freely(start: Array, conditions: FlightConditions, out: Array) -> float:
+    """Fall freely to the plane, or to the true ground where there is one; return the time it took."""
+    if conditions.footing.elevation.size > 0:
+        return fall_to_ground(start, conditions.gravity, conditions.footing, out)
+    return fall_to_plane(start, conditions.gravity, conditions.plane, out)
+
+
+@compile_kernel
 def hold_period(
     start: Array, commanded: Array, conditions: FlightConditions, out: Array
 ) -> tuple[float, int]:
@@ -149,6 +164,6 @@ def hold_period(
     if crossed:
         return flown, TOUCHDOWN
     if dry:
-        flown += fall_to_plane(out.copy(), conditions.gravity, conditions.plane, out)
+        flown += fall_freely(out.copy(), conditions, out)
         return flown, TANK_EMPTY
     return flown, FLYING

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from guidance.arrays import Array
 from guidance.kernel import compile_kernel
 from guidance.thrust_limits import limit_into
@@ -14,9 +17,10 @@ from hda.flight.held_thrust import (
     TOUCHDOWN,
     FlightConditions,
     VehicleLimits,
-    fall_to_plane,
+    fall_freely,
     hold_period,
 )
+from hda.safety.touchdown_stance import Footing
 
 _LEAST_TELLING = 0.05  # [m/s^2] commanded acceleration under which the engine's error is not estimated
 
@@ -46,7 +50,12 @@ class _Log(NamedTuple):
     commanded: Array
 
 
-_PlainConditions = tuple[float, float, Array, tuple[float, float, float, float, float], float, Array]
+_PlainFooting = tuple[NDArray[np.float32], Array, float, float, float]
+"""`Footing` without names."""
+
+_PlainConditions = tuple[
+    float, float, Array, tuple[float, float, float, float, float], float, Array, _PlainFooting
+]
 """`FlightConditions` without names."""
 
 
@@ -71,7 +80,7 @@ def _fly_zem_zev(
         remaining = command.time_to_go - command.time_to_go_rate * period * k
         if remaining <= 0.5 * period:
             commanded[k] = 0.0
-            time[k + 1] = time[k] + fall_to_plane(path[k], gravity, conditions.plane, path[k + 1])
+            time[k + 1] = time[k] + fall_freely(path[k], conditions, path[k + 1])
             return k + 2, TOUCHDOWN, limited
         if k == periods:
             break
@@ -112,7 +121,7 @@ def _fly_plan(
     for k in range(periods + 1):
         if k >= planned:
             commanded[k] = 0.0
-            time[k + 1] = time[k] + fall_to_plane(path[k], gravity, conditions.plane, path[k + 1])
+            time[k + 1] = time[k] + fall_freely(path[k], conditions, path[k + 1])
             return k + 2, TOUCHDOWN, limited
         if k == periods:
             break
@@ -156,6 +165,14 @@ def _estimate_error(
 
 
 @compile_kernel
+def _name_conditions(conditions: _PlainConditions) -> FlightConditions:
+    period, plane, gravity, vehicle, thrust_error, navigation, footing = conditions
+    return FlightConditions(
+        period, plane, gravity, VehicleLimits(*vehicle), thrust_error, navigation, Footing(*footing)
+    )
+
+
+@compile_kernel
 def enter_zem_zev(
     start: Array,
     site: Array,
@@ -164,8 +181,7 @@ def enter_zem_zev(
     log: tuple[Array, Array, Array],
 ) -> tuple[int, int, int]:
     """`_fly_zem_zev` of plain tuples: numba takes them from Python several times as fast as named ones."""
-    period, plane, gravity, vehicle, thrust_error, navigation = conditions
-    named = FlightConditions(period, plane, gravity, VehicleLimits(*vehicle), thrust_error, navigation)
+    named = _name_conditions(conditions)
     return _fly_zem_zev(start, site, _ZemZevNumbers(*command), named, _Log(*log))
 
 
@@ -178,6 +194,5 @@ def enter_plan(
     log: tuple[Array, Array, Array],
 ) -> tuple[int, int, int]:
     """`_fly_plan` of plain tuples."""
-    period, plane, gravity, vehicle, thrust_error, navigation = conditions
-    named = FlightConditions(period, plane, gravity, VehicleLimits(*vehicle), thrust_error, navigation)
+    named = _name_conditions(conditions)
     return _fly_plan(start, _Reference(*reference), TrackingGains(*gains), named, _Log(*log))

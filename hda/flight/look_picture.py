@@ -89,7 +89,7 @@ def draw_looks(record: EpisodeRecord, most: int = 6) -> Figure:
             axis.plot(*site[:2], "+", color=COLORS[0], markersize=11, markeredgewidth=1.8)
         height = observation.state.position[2] - observation.target[2]
         cells = 0.0 if grid is None else grid.pixel_size
-        row[0].set_title(f"look {number}, {height:.0f} m above the plane: heights in cells of {cells:g} m")
+        row[0].set_title(f"look {number}, {height:.0f} m above the target: heights in cells of {cells:g} m")
         row[1].set_title("verdict on board")
         row[2].set_title("true safety")
         for axis in row:

@@ -11,6 +11,7 @@ import numpy as np
 from guidance.arrays import Array
 from guidance.lander import Lander
 from guidance.state import State
+from hda.flight.touchdown_report import TouchdownReport
 from hda.task.rules import Rules
 
 
@@ -20,11 +21,11 @@ class Ending(StrEnum):
     SUCCESS = "success"
     """Safe ground, soft touchdown, propellant left."""
     HARD_LANDING = "hard-landing"
-    """Safe ground, but faster than the soft speed."""
+    """Safe ground, but too fast."""
     UNSAFE_SITE = "unsafe-site"
     """Landed on a hazard or outside the map."""
     CRASH = "crash"
-    """Touchdown above the crash speed."""
+    """Touchdown above the crash speed; on real ground also a strike on the way, or a fall to the side."""
     TANK_EMPTY = "tank-empty"
     """The propellant ran out before touchdown."""
     TIMED_OUT = "timed-out"
@@ -35,7 +36,7 @@ ENDINGS: dict[str, str] = {
     Ending.SUCCESS: "landed softly on safe ground",
     Ending.HARD_LANDING: "reached safe ground, but too fast to be a success",
     Ending.UNSAFE_SITE: "touched down on hazardous ground",
-    Ending.CRASH: "hit the ground faster than the crash speed",
+    Ending.CRASH: "crashed into the ground",
     Ending.TANK_EMPTY: "ran out of propellant above the ground",
     Ending.TIMED_OUT: "was still in flight after its last decision",
 }
@@ -44,17 +45,19 @@ ENDINGS: dict[str, str] = {
 
 @dataclass(frozen=True)
 class Contact:
-    """How the plane was met.
+    """How the plane or the ground was met.
 
     Attributes:
-        landed: the plane was crossed.
+        landed: it was.
         safe_cell: the cell there is safe.
         tank_empty: the tank ran dry before.
+        report: how the lander stands on real ground; None where flights end on the plane.
     """
 
     landed: bool
     safe_cell: bool
     tank_empty: bool
+    report: TouchdownReport | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,12 +66,15 @@ class Outcome:
 
     Attributes:
         ending: one word for it.
-        touchdown: [m] shape (3,), where the target plane was crossed (or the last position, if timed out).
-        safe_site: the touchdown cell is safe, the paper's ratio; false if timed out.
+        touchdown: [m] shape (3,), where the target plane was crossed or the ground touched (or the last
+            position, if timed out).
+        safe_site: the touchdown cell is safe, the paper's ratio; on real ground, slope and clearance keep
+            their limits where the lander stands. False if timed out.
         success: safe site, soft touchdown, propellant left, no crash.
         miss_distance: [m] from the touchdown to the last target.
         touchdown_speed: [m/s].
         propellant_fraction: propellant burnt over propellant at the start.
+        report: of the touchdown on real ground; None where flights end on the plane, or in flight.
     """
 
     ending: Ending
@@ -78,6 +84,7 @@ class Outcome:
     miss_distance: float
     touchdown_speed: float
     propellant_fraction: float
+    report: TouchdownReport | None = None
 
 
 def classify(
@@ -92,21 +99,26 @@ def classify(
 
     Args:
         initial: state at t = 0.
-        final: state at the crossing of the plane, or after the last decision.
+        final: state at the crossing of the plane or the contact, or after the last decision.
         target: [m] shape (3,), the last target.
-        contact: how the plane was met.
+        contact: how the plane or the ground was met.
         lander: the vehicle.
-        rules: they set the speed limits.
+        rules: they set the speed limits; those of a touchdown on real ground are in its report.
     """
+    report = contact.report
     speed = float(np.linalg.norm(final.velocity))
     horizontal = math.hypot(final.velocity[0], final.velocity[1])
     soft = abs(final.velocity[2]) <= rules.soft_speed and horizontal <= rules.soft_speed
     safe_site = contact.landed and contact.safe_cell
+    wrecked = speed > rules.crash_speed
+    if report is not None:
+        soft, safe_site = report.soft, report.safe_ground
+        wrecked = wrecked or report.wrecked
     if not contact.landed:
         ending = Ending.TIMED_OUT
     elif contact.tank_empty:
         ending = Ending.TANK_EMPTY
-    elif speed > rules.crash_speed:
+    elif wrecked:
         ending = Ending.CRASH
     elif not safe_site:
         ending = Ending.UNSAFE_SITE
@@ -122,6 +134,7 @@ def classify(
         miss_distance=float(np.linalg.norm(final.position - target)),
         touchdown_speed=speed,
         propellant_fraction=(initial.mass - final.mass) / (initial.mass - lander.dry_mass),
+        report=report,
     )
 
 

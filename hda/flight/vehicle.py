@@ -4,7 +4,7 @@ At each control instant the law gives a thrust, the vehicle takes the nearest wi
 pointing limit (`guidance.thrust_limits`), applies it with this interval's relative error, and holds it for
 one control period; motion under a held thrust is exact (`guidance.dynamics`). When the time to go falls to
 half a control period the engine is cut off and the vehicle falls freely to the target plane. The flight ends
-where the plane is crossed, whatever the engine does.
+where the plane is crossed, whatever the engine does; over true ground, where its pads or its belly touch it.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from guidance.thrust_limits import pointing_angle
 from hda.flight import held_thrust
 from hda.flight.interval import enter_plan, enter_zem_zev
 from hda.policy import Decision, ZemZevCommand
+from hda.safety.touchdown_stance import NO_GROUND, Footing
 
 
 @dataclass(frozen=True)
@@ -41,9 +42,22 @@ class FlightStatus(IntEnum):
 
     FLYING = held_thrust.FLYING
     TOUCHDOWN = held_thrust.TOUCHDOWN
-    """The target plane was crossed."""
+    """The target plane was crossed, or the true ground was touched."""
     TANK_EMPTY = held_thrust.TANK_EMPTY
-    """The tank ran dry above the plane; the vehicle then fell to it."""
+    """The tank ran dry above; the vehicle then fell."""
+
+
+@dataclass(frozen=True, eq=False)
+class Surroundings:
+    """What acts on the vehicle from outside.
+
+    Attributes:
+        gravity: [m/s^2] shape (3,), pointing down.
+        footing: the lander over the true ground; without ground the flight ends on the plane of the site.
+    """
+
+    gravity: Array
+    footing: Footing = NO_GROUND
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,13 +110,25 @@ def fly_interval(
     interval: ControlPeriods,
     errors: FlightErrors,
 ) -> Segment:
+    """Fly a decision until the next look or the plane of its site; arguments as of `fly_over`."""
+    return fly_over(state, decision, lander, Surroundings(gravity), interval, errors)
+
+
+def fly_over(
+    state: State,
+    decision: Decision,
+    lander: Lander,
+    surroundings: Surroundings,
+    interval: ControlPeriods,
+    errors: FlightErrors,
+) -> Segment:
     """Fly a decision until the next look or the ground.
 
     Args:
-        state: where the interval starts, above the plane of the decision's site.
+        state: where the interval starts, above the ground.
         decision: site and command.
         lander: the vehicle, which limits the thrust.
-        gravity: [m/s^2] shape (3,), pointing down.
+        surroundings: gravity, and the true ground if there is one.
         interval: control periods to the next look.
         errors: of the applied thrust and of the estimated state over this interval.
 
@@ -122,7 +148,9 @@ def fly_interval(
         pointing_angle(lander),
     )
     plane = float(decision.site[2])
-    conditions = (interval.period, plane, gravity, vehicle, errors.thrust, errors.navigation)
+    gravity, ground = surroundings.gravity, surroundings.footing
+    footing = (ground.elevation, ground.pads, ground.pad_radius, ground.clearance, ground.plane)
+    conditions = (interval.period, plane, gravity, vehicle, errors.thrust, errors.navigation, footing)
     start, log, command = state.as_array(), (time, path, commanded), decision.command
     if isinstance(command, ZemZevCommand):
         rate = command.time_to_go_rate

@@ -10,7 +10,7 @@ from guidance.arrays import Array
 from guidance.tracking.reference import TrackingReference
 from guidance.tracking.regulator import tracking_gains
 from guidance.tracking.retarget import shift_landing_point, velocity_change, within_pointing, within_thrust
-from hda.policies.planned_descent import DescentMemory, PlannedDescent
+from hda.policies.planned_descent import DescentMemory, PlannedDescent, raise_plan
 from hda.policy import Command, DecisionStatus, PlanCommand
 from hda.task.observation import Observation, ScenarioView
 
@@ -40,6 +40,7 @@ class AdjustedDescent:
         self, observation: Observation, site: Array, memory: DescentMemory
     ) -> tuple[Command, DecisionStatus, DescentMemory]:
         """Shift the plan in flight, replan, or fly on."""
+        memory = raise_plan(memory, site)
         remaining, view = memory.reference, memory.view
         if remaining is None or memory.site is None or np.array_equal(site, memory.site):
             return self.planned.command(observation, site, memory)

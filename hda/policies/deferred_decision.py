@@ -193,7 +193,7 @@ class DeferredDecisionPolicy:
             cells.append((row, column))
             price[max(row - apart, 0) : row + apart + 1, max(column - apart, 0) : column + apart + 1] = np.inf
         plane = float(observation.target[2])
-        sites = np.array([belief.site(*cell, plane) for cell in cells])
+        sites = np.array([observation.settled(belief.site(*cell, plane)) for cell in cells])
         if cells[0] == present:
             sites[0] = observation.target
         return Candidates(sites, np.array([float(landing[cell]) for cell in cells]))

@@ -113,7 +113,7 @@ class HazardAwareSite:
         present = belief.cell(observation.target)
         if present is not None and price[present] <= price[best] + self.weights.switch_gain:
             return observation.target, memory
-        return belief.site(*best, float(observation.target[2])), memory
+        return observation.settled(belief.site(*best, float(observation.target[2]))), memory
 
 
 @lru_cache(maxsize=2)

@@ -13,6 +13,7 @@ from guidance.lander import Lander
 from guidance.state import State
 from guidance.tracking.reference import TrackingReference
 from guidance.tracking.regulator import DEFAULT_WEIGHTS, TrackingWeights, tracking_gains
+from guidance.tracking.retarget import shift_landing_point
 from guidance.tracking.soft_landing import DEFAULT_OPTIONS, SoftLanding, SoftLandingOptions, plan_soft_landing
 from hda.policies.zem_zev import FixedGainZemZev
 from hda.policy import Command, DecisionStatus, PlanCommand
@@ -60,6 +61,7 @@ class PlannedDescent:
         self, observation: Observation, site: Array, memory: DescentMemory
     ) -> tuple[Command, DecisionStatus, DescentMemory]:
         """Replan, or fly on."""
+        memory = raise_plan(memory, site)
         remaining = memory.reference
         same_site = memory.site is not None and np.array_equal(site, memory.site)
         if same_site and remaining is not None and remaining.duration <= self.commit_time:
@@ -101,6 +103,17 @@ class PlannedDescent:
         view = memory.view
         command = PlanCommand(reference, tracking_gains(view.control_period, self.weights))
         return command, status, replace(memory, reference=reference.after(view.control_periods))
+
+
+def raise_plan(memory: DescentMemory, site: Array) -> DescentMemory:
+    """The memory with its plan raised or lowered to a new height of the same place; as it was elsewhere."""
+    remaining, old = memory.reference, memory.site
+    if remaining is None or old is None or not np.array_equal(site[:2], old[:2]) or site[2] == old[2]:
+        return memory
+    end = remaining.position[-1] + (site - old)
+    return replace(
+        memory, site=site.copy(), reference=shift_landing_point(remaining, end, memory.view.gravity)
+    )
 
 
 @lru_cache(maxsize=8)

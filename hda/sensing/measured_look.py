@@ -12,8 +12,13 @@ from guidance.arrays import Array
 from hda.safety.criteria import SafetyCriteria
 from hda.safety.lander_footprint import LanderFootprint, make_footprint
 from hda.safety.safety_map import assess_safety
+from hda.safety.touchdown_stance import Stance
 from hda.sensing.gridding import ElevationMap, PixelGrid, grid_points, lay_grid
 from hda.sensing.ranging import PointCloud, RangingLidar
+
+STANDOFF = 0.15
+"""[m] above the measured contact at which a site is put: about two sigma of that height, seen from 300 m. To
+fall so far costs 0.7 m/s; to meet the ground before the flight is at rest may cost more."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +57,41 @@ class MeasuredGround:
     def known_map(self, center: Array, width: float, pixels: int) -> NDArray[np.bool_]:
         """Whether V_P is known at the centres of the pixels of a square look, as `safety_map`."""
         return self._at_pixels(self.known, center, width, pixels)
+
+    def contact_height(self, stance: Stance, x: float, y: float) -> tuple[float, int]:
+        """Where the upright lander over (x, y) [m] first touches the measured ground.
+
+        Returns:
+            [m] height of the pads' plane, NaN where nothing below was measured; and how many of the four pads
+            were over ground that was. The cells' heights are their highest points, so the height errs upward.
+        """
+        pads = self._heights_at(x + stance.pads[:, 0], y + stance.pads[:, 1])
+        steps = np.arange(-stance.pad_distance, stance.pad_distance, self.grid.pixel_size)
+        east, north = (part.ravel() for part in np.meshgrid(steps, steps))
+        first, second = (np.abs(east * pad[0] + north * pad[1]) for pad in stance.pads[:2])
+        between = first + second < stance.pad_distance**2
+        belly = self._heights_at(x + east[between], y + north[between]) - stance.clearance
+        known = np.isfinite(pads)
+        highest = float(np.fmax.reduce(np.concatenate([pads, belly])))
+        return highest if known.any() else np.nan, int(known.sum())
+
+    def site_height(self, stance: Stance, x: float, y: float) -> tuple[float, int]:
+        """As `contact_height`, but the height to fly to: `STANDOFF` above the contact."""
+        height, pads = self.contact_height(stance, x, y)
+        return height + STANDOFF, pads
+
+    def middle_height(self, otherwise: float) -> float:
+        """[m] median of the measured heights, or `otherwise` if there are none."""
+        height = self.elevation.height
+        return float(np.nanmedian(height)) if np.isfinite(height).any() else otherwise
+
+    def _heights_at(self, x: Array, y: Array) -> Array:
+        """[m] heights of the cells that hold some points; NaN in holes and outside the grid."""
+        rows, columns = self.grid.rows_of(y), self.grid.columns_of(x)
+        inside = (rows >= 0) & (rows < self.grid.rows) & (columns >= 0) & (columns < self.grid.columns)
+        out = np.full(rows.shape, np.nan)
+        out[inside] = self.elevation.height[rows[inside], columns[inside]]
+        return out
 
     def _at_pixels(self, values: NDArray[Any], center: Array, width: float, pixels: int) -> NDArray[Any]:
         """Values of the cells that hold the pixels' centres; 0 outside the grid."""

@@ -1,8 +1,8 @@
 """The task: its rules, its presets, and the scenario of an episode.
 
-A preset names ground, starts, sensor, rules and lander; a scenario is one draw from it by streams of random
-numbers that no policy can disturb. What a policy may know is an `Observation` and a `ScenarioView`. It
-imports the ground and the sensor; policies and the simulator import it.
+A preset names ground, starts, sensor, rules, lander and where its flights end; a scenario is one draw from it
+by streams of random numbers that no policy can disturb. What a policy may know is an `Observation` and a
+`ScenarioView`. It imports the ground and the sensor; policies and the simulator import it.
 """
 
 from typing import TYPE_CHECKING
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from hda.task.presets import PRESETS, Preset, find_preset
     from hda.task.rules import Range, Rules, StartConditions
     from hda.task.scenario import Scenario, sample_scenario
+    from hda.task.touchdown import GroundTouchdown, PlaneTouchdown
 
 _HOMES = {
     "hda.task.observation": (
@@ -36,11 +37,17 @@ _HOMES = {
         "Scenario",
         "sample_scenario",
     ),
+    "hda.task.touchdown": (
+        "GroundTouchdown",
+        "PlaneTouchdown",
+    ),
 }
 
 __all__ = [
     "PRESETS",
+    "GroundTouchdown",
     "Observation",
+    "PlaneTouchdown",
     "Preset",
     "Range",
     "Rules",

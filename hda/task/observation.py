@@ -12,6 +12,7 @@ from guidance.arrays import Array
 from guidance.lander import Lander
 from guidance.state import State
 from hda.safety.criteria import DEFAULT_CRITERIA, SafetyCriteria
+from hda.safety.touchdown_stance import Stance
 from hda.sensing.gridding import PixelGrid
 from hda.sensing.lidar import Lidar
 from hda.sensing.measured_look import MeasuredGround
@@ -63,13 +64,17 @@ class Observation:
         index: number of the decision, from 0.
         time: [s] since the start.
         state: estimated position, velocity and mass.
-        target: [m] shape (3,), current target: the centre of the look.
+        target: [m] shape (3,), current target: the centre of the look. Where flights end on real ground its
+            height is the newest that was measured there.
         safety_map: shape (n, n), observed probability of safety, row i grows north, column j east. Of a
             ranging LIDAR it is Algorithm 1's verdict on the measured ground, 0 where that is not known.
         width: [m] side of the square look.
         time_to_go: [s] what remains of the commanded time to go.
         ground: what a ranging LIDAR measured, in the frame of the estimated state; None where the sensor
             gives the map alone.
+        stance: pads and belly of a lander that touches down on real ground; None where sites keep the height
+            of the target: on a target plane, and when so little time is left that a new height would trouble
+            the flight more than the error of the old.
     """
 
     index: int
@@ -80,6 +85,7 @@ class Observation:
     width: float
     time_to_go: float
     ground: MeasuredGround | None = None
+    stance: Stance | None = None
 
     @property
     def has_map(self) -> bool:
@@ -113,15 +119,37 @@ class Observation:
         return ((np.arange(n) + 0.5) / n - 0.5) * self.width
 
     def site(self, row: int, column: int) -> Array:
-        """[m] shape (3,), centre of pixel (row, column) on the target plane."""
+        """[m] shape (3,), centre of pixel (row, column), on the target plane or the measured ground."""
         n = self.safety_map.shape[0]
-        return np.array(
-            [
-                self.target[0] + ((column + 0.5) / n - 0.5) * self.width,
-                self.target[1] + ((row + 0.5) / n - 0.5) * self.width,
-                self.target[2],
-            ]
+        return self.settled(
+            np.array(
+                [
+                    self.target[0] + ((column + 0.5) / n - 0.5) * self.width,
+                    self.target[1] + ((row + 0.5) / n - 0.5) * self.width,
+                    self.target[2],
+                ]
+            )
         )
+
+    def settled(self, site: Array) -> Array:
+        """[m] shape (3,), a site at the height of its ground; itself where sites keep the target's height."""
+        if self.stance is None:
+            return site
+        return np.array([site[0], site[1], self.ground_height(float(site[0]), float(site[1]))])
+
+    def ground_height(self, x: float, y: float) -> float:
+        """[m] height to fly to at (x, y): just above where the upright lander first touches measured ground.
+
+        That is `hda.sensing.measured_look.STANDOFF` above the contact of a pad or of the belly.
+        It is the target's height of the target itself, where sites keep that height, where the ground of no
+        pad was measured, and near the target where that of some was not.
+        """
+        target, stance = float(self.target[2]), self.stance
+        away = math.hypot(x - self.target[0], y - self.target[1])
+        if stance is None or self.ground is None or away == 0.0:
+            return target
+        height, pads = self.ground.site_height(stance, x, y)
+        return height if pads == 4 or (pads > 0 and away > stance.pad_distance) else target
 
     def pixel(self, site: Array) -> tuple[int, int] | None:
         """(row, column) of the pixel that contains `site` (its x and y count), or None outside the look."""

@@ -5,7 +5,7 @@ docs/explanation/calibration.md shows what they give beside the paper's row. `pa
 `paper` seen badly, so that one look is not enough: five times its map noise, two looks of five without a map,
 and errors of the estimated state.
 On `lidar` and `lidar-coarse` a look is no longer the true map with noise on it: ranges are measured to the
-same ground, 128 or 64 rays a side, gridded, and assessed on board.
+same ground, 128 or 64 rays a side, gridded, and assessed on board; and the flight ends on the real ground.
 """
 
 from __future__ import annotations
@@ -17,9 +17,11 @@ from guidance.lander import PAPER_LANDER, Lander
 from guidance.validation import finite_number, finite_vector, unknown_name
 from hda.ground.own_terrain import OwnTerrain
 from hda.safety.criteria import SafetyCriteria
+from hda.safety.touchdown_stance import Stance
 from hda.sensing.lidar import Lidar
 from hda.sensing.ranging import RangingLidar
 from hda.task.rules import Rules, StartConditions
+from hda.task.touchdown import GroundTouchdown, PlaneTouchdown, Touchdown
 from hda.terrain.generator import TerrainParameters
 from hda.terrain.islands import IslandField
 from hda.terrain.settings import BOULDERS, PAPER_TERRAIN
@@ -38,9 +40,11 @@ class Preset:
         rules: timing, dispersions, judgement.
         lander: the vehicle.
         gravity: [m/s^2] site frame, pointing down.
+        touchdown: where a flight ends, and how it is judged there.
 
     Raises:
-        ValueError: gravity does not point down, or a start has no propellant or lies below the target plane.
+        ValueError: gravity does not point down, a start has no propellant or lies below the target plane, or
+            flights end on real ground whose height no sensor measures.
     """
 
     name: str
@@ -51,6 +55,7 @@ class Preset:
     rules: Rules = field(default_factory=Rules)
     lander: Lander = PAPER_LANDER
     gravity: tuple[float, float, float] = MOON_GRAVITY
+    touchdown: Touchdown = field(default_factory=PlaneTouchdown)
 
     def __post_init__(self) -> None:
         """The ground must be below, and the tank must hold something."""
@@ -58,6 +63,13 @@ class Preset:
             raise ValueError(f"gravity must point down (z below zero), got {self.gravity}")
         finite_number("start.mass", self.start.mass.low, above=self.lander.dry_mass)
         finite_number("start.altitude", self.start.altitude.low, above=self.terrain.maximum_elevation)
+        if self.stance is not None and not isinstance(self.lidar, RangingLidar):
+            raise ValueError("touchdown on real ground needs a lidar that measures ranges")
+
+    @property
+    def stance(self) -> Stance | None:
+        """The lander's pads and belly where it touches down on real ground; None on the plane."""
+        return self.touchdown.stance(self.criteria)
 
 
 PRESETS: dict[str, Preset] = {
@@ -74,8 +86,18 @@ PRESETS: dict[str, Preset] = {
             lidar=Lidar(noise=0.25, dropout=0.4),
             rules=Rules(navigation_position_error=0.5, navigation_velocity_error=0.1),
         ),
-        Preset(name="lidar", terrain=PAPER_TERRAIN, lidar=RangingLidar(rays=128)),
-        Preset(name="lidar-coarse", terrain=PAPER_TERRAIN, lidar=RangingLidar(rays=64)),
+        Preset(
+            name="lidar",
+            terrain=PAPER_TERRAIN,
+            lidar=RangingLidar(rays=128),
+            touchdown=GroundTouchdown(),
+        ),
+        Preset(
+            name="lidar-coarse",
+            terrain=PAPER_TERRAIN,
+            lidar=RangingLidar(rays=64),
+            touchdown=GroundTouchdown(),
+        ),
     )
 }
 """The presets by name."""

@@ -12,6 +12,7 @@ from guidance.arrays import Array
 from guidance.state import State
 from hda.ground.library import FRESH_SPLIT, Ground, load_tile, tile_numbers
 from hda.ground.tile import Tile
+from hda.safety.touchdown_stance import NO_GROUND, Footing, make_footing
 from hda.task.observation import ScenarioView
 from hda.task.presets import Preset, find_preset
 from hda.task.random_streams import EpisodeStreams
@@ -59,6 +60,14 @@ class Scenario:
             criteria=self.preset.criteria,
         )
 
+    @property
+    def footing(self) -> Footing:
+        """The lander over the true ground; without ground where flights end on the plane."""
+        stance = self.preset.stance
+        if stance is None:
+            return NO_GROUND
+        return make_footing(self.tile.elevation, stance, float(self.nominal_target[2]))
+
 
 def estimated_state(scenario: Scenario, state: State) -> State:
     """The state as the lander estimates it: the true one plus the episode's navigation error."""
@@ -67,13 +76,15 @@ def estimated_state(scenario: Scenario, state: State) -> State:
 
 
 def ground_point(scenario: Scenario, site: Array) -> Array:
-    """[m] shape (3,), where a site in the frame of the estimated position really lies on the plane.
+    """[m] shape (3,), where a site in the frame of the estimated position really lies.
 
     The lander points and places its looks relative to itself, so what it takes to be at `site` is off by the
-    horizontal error of its own position.
+    error of its own position: by the horizontal one where the height is the plane's, by all of it where the
+    height was measured.
     """
     error = scenario.navigation_error
-    return site - np.array([error[0], error[1], 0.0])
+    vertical = 0.0 if scenario.preset.stance is None else error[2]
+    return site - np.array([error[0], error[1], vertical])
 
 
 def draw_target(tile: Tile, start: StartConditions, plane: float, rng: np.random.Generator) -> Array:

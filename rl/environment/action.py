@@ -54,7 +54,8 @@ def decide_action(
 
     Args:
         action: shape (5,), in the order of `ACTION_NAMES`; values outside [-1, 1] are clipped.
-        observation: what was seen; the target moves by a share of its width, x_f(t) = x_f(t-1) + alpha_x w.
+        observation: what was seen; the target moves by a share of its width, x_f(t) = x_f(t-1) + alpha_x w,
+            and on measured ground takes the height that is measured there.
         ranges: what -1 and 1 mean.
 
     Raises:
@@ -67,7 +68,7 @@ def decide_action(
         raise ValueError(f"action must be finite, got {values.tolist()}")
     position_gain, velocity_gain, step, shift_x, shift_y = np.clip(values, -1.0, 1.0).tolist()
     greatest = ranges.shift * observation.width
-    site = observation.target + np.array([shift_x * greatest, shift_y * greatest, 0.0])
+    site = observation.settled(observation.target + np.array([shift_x * greatest, shift_y * greatest, 0.0]))
     command = ZemZevCommand(
         position_gain=_between(ranges.position_gain, position_gain),
         velocity_gain=_between(ranges.velocity_gain, velocity_gain),

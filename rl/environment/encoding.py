@@ -156,6 +156,8 @@ LAYOUTS = {layout.name: layout for layout in (RELATIVE, CURVED, PRINTED)}
 def encode_flight(layout: Layout, observation: Observation, nominal_target: Array) -> Array32:
     """Encode all of an observation but its map.
 
+    Heights count as if the target lay on the plane of the first one: on measured ground as on the plane.
+
     Args:
         layout: which elements.
         observation: what was seen.
@@ -165,13 +167,15 @@ def encode_flight(layout: Layout, observation: Observation, nominal_target: Arra
         Shape (12,).
     """
     state = observation.state
+    lift = np.array([0.0, 0.0, observation.target[2] - nominal_target[2]])
+    position, target = state.position - lift, observation.target - lift
     if layout is not PRINTED:
         clock = (observation.width, observation.time_to_go)
-        parts = (state.position - observation.target, state.velocity, (state.mass,), clock)
-        values = np.concatenate([*parts, observation.target - nominal_target])
+        parts = (position - target, state.velocity, (state.mass,), clock)
+        values = np.concatenate([*parts, target - nominal_target])
     else:
         widths = (observation.width, observation.width)
-        parts = (state.position, state.velocity, (state.mass,), widths, observation.target)
+        parts = (position, state.velocity, (state.mass,), widths, target)
         values = np.concatenate(parts)
     return layout.scaled(values)
 

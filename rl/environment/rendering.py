@@ -50,7 +50,7 @@ def render_flight(scenario: Scenario, steps: Sequence[Step], observation: Observ
     ground.set_xlim(middle[0] - _HALF_SIDE, middle[0] + _HALF_SIDE)
     ground.set_ylim(middle[1] - _HALF_SIDE, middle[1] + _HALF_SIDE)
     height = path[-1, 2] - observation.target[2]
-    ground.set_title(f"true safety; t = {observation.time:.0f} s, {height:.0f} m above the plane")
+    ground.set_title(f"true safety; t = {observation.time:.0f} s, {height:.0f} m above the target")
     seen.imshow(
         observation.safety_map, cmap="gray", origin="lower", vmin=0, vmax=1, extent=(-half, half, -half, half)
     )

@@ -27,7 +27,8 @@ from guidance.state import State
 from hda.flight.episode import fly
 from hda.flight.outcome import Ending
 from hda.flight.record import EpisodeRecord
-from hda.policies.privileged.knowable_ground import KnowableGround
+from hda.flight.touchdown_report import TouchdownFault
+from hda.policies.privileged.knowable_ground import KnowableGround, true_heights
 from hda.sensing.lidar import Lidar
 from hda.sensing.ranging import RangingLidar
 from hda.task.observation import Observation
@@ -53,6 +54,7 @@ class Cause(StrEnum):
     SATURATED = "hard touchdown: the engine was at its limit in the last interval"
     LATE_DIVERT = "hard touchdown: the site changed in the last two looks"
     HARD = "hard touchdown on an unhurried approach"
+    STRIKE = "it struck the ground on its way to the site"
     TANK_EMPTY = "the tank ran dry"
     TIMED_OUT = "still in flight after the last decision"
 
@@ -71,9 +73,10 @@ class Failure:
         last_reading: of the site, in the last look that read it; nan if none did.
         last_reading_s: time from that look to the touchdown; nan if none read it.
         last_change_s: time from the last change of site to the touchdown.
-        touchdown_speed_mps: speed at the plane.
+        touchdown_speed_mps: speed at the plane or the ground.
         miss_m: distance from the touchdown to the site.
         remedies: single changes that make the episode a success.
+        faults: what failed at a touchdown on real ground; empty where flights end on the target plane.
     """
 
     episode: int
@@ -88,6 +91,7 @@ class Failure:
     touchdown_speed_mps: float
     miss_m: float
     remedies: tuple[str, ...] = ()
+    faults: tuple[str, ...] = ()
 
 
 def read_pixels(
@@ -131,11 +135,12 @@ def count_safe_cells(record: EpisodeRecord) -> tuple[int, int]:
         ground = KnowableGround(
             state, aim, observation.width, scenario.view, scenario.preset.rules.soft_speed
         )
-        plane = float(observation.target[2])
+        left = np.array(sorted(cells - reached), dtype=int).reshape(-1, 2)
+        heights = true_heights(scenario, left[:, 0], left[:, 1])
         reached |= {
             (row, column)
-            for row, column in cells - reached
-            if ground.within_reach(np.array([column + 0.5, row + 0.5, plane]))
+            for (row, column), height in zip(left.tolist(), heights, strict=True)
+            if ground.within_reach(np.array([column + 0.5, row + 0.5, height]))
         }
     return len(seen), len(reached)
 
@@ -194,6 +199,7 @@ def explain_failure(record: EpisodeRecord) -> Failure:
         last_change_s=end - record.observations[last_change(record)].time,
         touchdown_speed_mps=outcome.touchdown_speed,
         miss_m=outcome.miss_distance,
+        faults=() if outcome.report is None else tuple(str(fault) for fault in outcome.report.faults),
     )
 
 
@@ -205,6 +211,9 @@ def _find_cause(
         return Cause.TANK_EMPTY
     if ending is Ending.TIMED_OUT:
         return Cause.TIMED_OUT
+    report = record.outcome.report
+    if report is not None and TouchdownFault.STRIKE in report.faults:
+        return Cause.STRIKE
     if ending in (Ending.HARD_LANDING, Ending.CRASH):
         return _find_hard_cause(record)
     if scenario.tile.is_safe(ground_point(scenario, record.decisions[-1].site)):

@@ -48,8 +48,8 @@ def draw_failure(record: EpisodeRecord, words: str) -> Figure:
 
 
 def _draw_descent(axis: Axes, record: EpisodeRecord) -> None:
-    plane = float(record.scenario.nominal_target[2])
-    axis.plot(record.time, record.position[:, 2] - plane, color=COLORS[0], label="height [m]")
+    ground = float(record.decisions[-1].site[2])
+    axis.plot(record.time, record.position[:, 2] - ground, color=COLORS[0], label="height [m]")
     axis.set_xlabel("time [s]")
     axis.set_yscale("symlog", linthresh=10.0)
     axis.set_ylim(bottom=0.0)

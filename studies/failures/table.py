@@ -23,6 +23,8 @@ def describe_failure(failure: Failure) -> str:
             f" {failure.safe_cells_in_reach} of them within reach."
         )
     words += f" The site last changed {failure.last_change_s:.1f} s before touchdown."
+    if failure.faults:
+        words += f" At the touchdown failed: {', '.join(failure.faults)}."
     if failure.remedies:
         words += f" A success with {' or with '.join(failure.remedies)}."
     return words
@@ -33,10 +35,12 @@ def picture_name(policy: str, episode: int) -> str:
     return f"{policy}-{episode:06d}.png"
 
 
+_LISTS = ("remedies", "faults")
+
 COLUMNS: tuple[Column[tuple[str, Failure]], ...] = (
     Column("policy", "policy", lambda row: row[0]),
-    *(column.through(lambda row: row[1]) for column in field_columns(Failure) if column.key != "remedies"),
-    Column("remedies", "remedies", lambda row: "; ".join(row[1].remedies)),
+    *(column.through(lambda row: row[1]) for column in field_columns(Failure) if column.key not in _LISTS),
+    *(Column(key, key, lambda row, key=key: "; ".join(getattr(row[1], key))) for key in _LISTS),
 )
 """failures.csv: policy and failure, a field a column."""
 
@@ -53,6 +57,10 @@ def write_markdown(
         lines += ["", f"## {policy}: {failed[policy]} failed, {shown} shown", ""]
         counts = Counter(failure.cause.value for failure in failures)
         lines += [f"- {count} x {cause}" for cause, count in counts.most_common()]
+        faults = Counter(fault for failure in failures for fault in failure.faults)
+        if faults:
+            told = ", ".join(f"{count} x {fault}" for fault, count in faults.most_common())
+            lines += ["", f"What failed at the touchdowns (one may fail by several): {told}."]
         lines += ["", "| episode | tile | ending | why |", "|---:|---:|---|---|"]
         for failure in failures:
             number = str(failure.episode)

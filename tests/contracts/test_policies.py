@@ -17,6 +17,7 @@ from hda.flight.episode import Flight, Step, advance, begin_flight, fly, observe
 from hda.flight.record import EpisodeRecord
 from hda.policy import Decision, DecisionStatus, PlanCommand, Policy, PrivilegedPolicy, ZemZevCommand
 from hda.registry import policy_entry
+from hda.safety.touchdown_stance import contact_height
 from hda.task.observation import Observation
 from hda.task.scenario import Scenario
 from tests.equality import parts, same
@@ -195,7 +196,7 @@ def test_it_decides_legally_from_any_start(name, scenarios):
         for observation, decision in zip(record.observations, record.decisions, strict=True):
             assert decision.site.shape == (3,)
             assert np.isfinite(decision.site).all()
-            assert decision.site[2] == pytest.approx(PLANE, abs=1e-6)
+            assert scenario.preset.stance is not None or decision.site[2] == pytest.approx(PLANE, abs=1e-6)
             assert isinstance(decision.command, ZemZevCommand | PlanCommand)
             assert isinstance(decision.status, DecisionStatus)
             assert math.isfinite(observation.time_to_go)
@@ -214,7 +215,21 @@ def test_it_decides_legally_where_nothing_and_where_everything_looks_safe(name, 
         memory = policy.begin(scenario.view, scenario.streams.policy())
         decision, _ = policy.decide(flat, memory)
         assert np.isfinite(decision.site).all()
-        assert decision.site[2] == pytest.approx(PLANE, abs=1e-6)
+        lowest, highest = scenario.tile.elevation.min() - 1.0, scenario.tile.elevation.max() + 1.0
+        assert lowest < decision.site[2] < highest
+
+
+def test_on_real_ground_it_flies_to_the_ground_that_was_measured(name, scenarios):
+    """Within two metres of where the lander would touch at its last site, and never the plane by default."""
+    for scenario in (scenarios[1], scenarios[3]):
+        record = fly(hda.make_policy(name), scenario)
+        site = record.decisions[-1].site
+        contact = contact_height(scenario.footing, float(site[0]), float(site[1]))
+        assert abs(site[2] - contact) < 2.0
+        assert record.outcome.report is not None
+        touchdown = record.outcome.touchdown
+        height = contact_height(scenario.footing, float(touchdown[0]), float(touchdown[1]))
+        assert touchdown[2] == pytest.approx(height, abs=1e-5)
 
 
 def test_thrust_errors_and_noise_of_an_episode_are_its_own_not_the_policys(name, scenarios):

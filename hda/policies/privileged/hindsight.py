@@ -28,7 +28,7 @@ class BestKnownSite(CheapestSafeSite):
     @classmethod
     def informed(cls, truth: Scenario) -> BestKnownSite:
         """Make the selection that knows the tile of this scenario, and its knowable ground."""
-        return cls(truth.tile, ground=first_ground(truth))
+        return cls(truth.tile, footing=truth.footing, ground=first_ground(truth))
 
     def choose(self, observation: Observation, view: ScenarioView) -> Site:
         """The first target where nothing could have been known."""

@@ -270,6 +270,13 @@ def first_ground(scenario: Scenario) -> KnowableGround:
     return KnowableGround(state, target, width, scenario.view, preset.rules.soft_speed)
 
 
+def true_heights(scenario: Scenario, rows: NDArray[np.int_], columns: NDArray[np.int_]) -> Array:
+    """[m] shape (n,), where a landing on each cell ends: on the target plane, or on the true ground."""
+    if scenario.preset.stance is None:
+        return np.full(rows.size, float(scenario.nominal_target[2]))
+    return scenario.tile.elevation[rows, columns].astype(np.float64)
+
+
 def could_have_landed(scenario: Scenario) -> bool:
     """Whether the episode's knowable ground holds truly safe ground: the ceiling of any policy that looks.
 
@@ -291,7 +298,7 @@ def least_propellant(scenario: Scenario) -> float:
     row, column = np.nonzero(scenario.tile.deterministic)
     if row.size == 0:
         return math.inf
-    sites = np.column_stack([column + 0.5, row + 0.5, np.full(row.size, ground.target[2])])
+    sites = np.column_stack([column + 0.5, row + 0.5, true_heights(scenario, row, column)])
     state, view, gravity = ground.state, ground.view, -float(ground.view.gravity[2])
     longest = (ground.budget + float(np.linalg.norm(state.velocity))) / gravity
     cost = _least_two_impulses(sites - state.position, state.velocity, gravity, longest)

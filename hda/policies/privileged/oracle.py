@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from hda.ground.tile import Tile
 from hda.policies.surroundings import squared_distance
+from hda.safety.touchdown_stance import NO_GROUND, Footing, set_down
 from hda.site_selection import Site
 from hda.task.observation import Observation, ScenarioView
 from hda.task.scenario import Scenario
@@ -47,15 +48,17 @@ class OracleSite:
     Attributes:
         truth: the tile that is being flown.
         clearance: [m] of safe ground around the site.
+        footing: the lander over the true ground, for the height of the site; none on the target plane.
     """
 
     truth: Tile = field(repr=False)
     clearance: float = 2.0
+    footing: Footing = field(default=NO_GROUND, repr=False)
 
     @classmethod
     def informed(cls, truth: Scenario) -> OracleSite:
         """Make the selection that knows the tile of this scenario."""
-        return cls(truth.tile)
+        return cls(truth.tile, footing=truth.footing)
 
     def begin(self, view: ScenarioView) -> None:
         """No site yet."""
@@ -63,5 +66,6 @@ class OracleSite:
     def select(self, observation: Observation, memory: Site | None) -> tuple[Site, Site]:
         """Choose once, then stay."""
         if memory is None:
-            memory = nearest_clear_site(self.truth, observation.target, self.clearance)
+            site = nearest_clear_site(self.truth, observation.target, self.clearance)
+            memory = set_down(self.footing, site)
         return memory, memory

@@ -11,6 +11,7 @@ from guidance.two_impulse import divert_cost
 from hda.ground.tile import Tile
 from hda.policies.hazard_aware import load_kernels
 from hda.policies.privileged.oracle import safe_clearance
+from hda.safety.touchdown_stance import NO_GROUND, Footing, set_down
 from hda.sensing.ranging import RangingLidar
 from hda.site_selection import Site
 from hda.task.observation import Observation, ScenarioView
@@ -64,15 +65,17 @@ class CheapestSafeSite:
     Attributes:
         truth: the tile that is being flown.
         clearance: [m] of safe ground around the site.
+        footing: the lander over the true ground, for the height of the site; none on the target plane.
     """
 
     truth: Tile = field(repr=False)
     clearance: float = 2.0
+    footing: Footing = field(default=NO_GROUND, repr=False)
 
     @classmethod
     def informed(cls, truth: Scenario) -> CheapestSafeSite:
         """Make the selection that knows the tile of this scenario."""
-        return cls(truth.tile)
+        return cls(truth.tile, footing=truth.footing)
 
     def begin(self, view: ScenarioView) -> tuple[ScenarioView, Site | None]:
         """No site yet; the map of clearances is made here, once per tile."""
@@ -86,7 +89,7 @@ class CheapestSafeSite:
         """Choose at the first look, then stay."""
         view, site = memory
         if site is None:
-            site = self.choose(observation, view)
+            site = set_down(self.footing, self.choose(observation, view))
         return site, (view, site)
 
     def choose(self, observation: Observation, view: ScenarioView) -> Site:
