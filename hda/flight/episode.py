@@ -26,15 +26,7 @@ from hda.safety.touchdown_stance import Stance
 from hda.sensing.lidar import look
 from hda.sensing.measured_look import MeasuredGround, measure_ground
 from hda.sensing.ranging import RangingLidar, scan
-from hda.task.estimation import (
-    begin_estimate,
-    close_sensing,
-    displaced,
-    estimation_error,
-    fix_estimate,
-    look_aim,
-    open_sensing,
-)
+from hda.task import estimation
 from hda.task.observation import Observation
 from hda.task.scenario import Scenario, ground_point
 
@@ -91,8 +83,8 @@ def begin_flight(scenario: Scenario) -> Flight:
     """Stand at t = 0: first target, and time to go of the quartic to it, or longer under a pointing limit."""
     state, preset = scenario.initial_state, scenario.preset
     target = scenario.nominal_target
-    navigation = begin_estimate(scenario)
-    estimate = displaced(state, estimation_error(scenario, navigation, state, target))
+    navigation = estimation.begin_estimate(scenario)
+    estimate = estimation.displaced(state, estimation.estimation_error(scenario, navigation, state, target))
     clock = upright_time_to_go(estimate, target, preset.lander, preset.gravity)
     return Flight(0, state, target, clock, navigation)
 
@@ -101,9 +93,9 @@ def observe(scenario: Scenario, flight: Flight) -> Observation:
     """Take the look of this instant; its noise depends on the episode and the number of the look only."""
     lidar = scenario.preset.lidar
     position = flight.state.position
-    error = estimation_error(scenario, flight.navigation, flight.state, flight.target)
-    aim = look_aim(scenario, flight.target, error)
-    estimate, width = displaced(flight.state, error), lidar.width(position, aim)
+    error = estimation.estimation_error(scenario, flight.navigation, flight.state, flight.target)
+    aim = estimation.look_aim(scenario, flight.target, error)
+    estimate, width = estimation.displaced(flight.state, error), lidar.width(position, aim)
     rules = scenario.preset.rules
     late = flight.index > 0 and flight.time_to_go <= _LATE * rules.decision_interval
     stance, ground = None if late else scenario.preset.stance, None
@@ -149,7 +141,7 @@ def _measure(scenario: Scenario, lidar: RangingLidar, flight: Flight, error: Arr
     The sensor points relative to the vehicle: an error of the estimated position moves the points with it.
     """
     draws = scenario.streams.scan(flight.index, lidar.rays)
-    aim = look_aim(scenario, flight.target, error)
+    aim = estimation.look_aim(scenario, flight.target, error)
     cloud = scan(lidar, scenario.tile.elevation, flight.state, aim, draws)
     position = flight.state.position + error[:3]
     shift = position - flight.state.position
@@ -172,8 +164,8 @@ def advance(scenario: Scenario, flight: Flight, decision: Decision) -> Step:
     aims = [ground_point(scenario, site) for site in (flight.target, decision.site)]
     slant = min(elevation_angle(position, aim) for aim in aims)
     thrust_error = scenario.streams.thrust_error(flight.index, rules.thrust_error)
-    error = estimation_error(scenario, flight.navigation, flight.state, flight.target)
-    sensing = open_sensing(scenario, flight.navigation, flight.target, decision.site, flight.index)
+    error = estimation.estimation_error(scenario, flight.navigation, flight.state, flight.target)
+    sensing = estimation.open_sensing(scenario, flight.navigation, flight.target, decision.site, flight.index)
     segment = fly_over(
         flight.state,
         decision,
@@ -183,10 +175,10 @@ def advance(scenario: Scenario, flight: Flight, decision: Decision) -> Step:
         FlightErrors(thrust_error, error, sensing),
     )
     state, landed = segment.final_state, segment.status is not FlightStatus.FLYING
-    navigation = close_sensing(flight.navigation, sensing, len(segment.commanded))
+    site, following, navigation = decision.site, flight.index + 1, None
     if not landed:
-        navigation = fix_estimate(scenario, navigation, state, decision.site, flight.index + 1)
-    after = Flight(flight.index + 1, state, decision.site, segment.time_to_go, navigation)
+        navigation = estimation.next_estimate(scenario, flight.navigation, sensing, state, site, following)
+    after = Flight(following, state, site, segment.time_to_go, navigation)
     truncated = not landed and after.index >= rules.max_decisions
     initial = scenario.initial_state
     outcome = None

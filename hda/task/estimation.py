@@ -33,17 +33,6 @@ def begin_estimate(scenario: Scenario) -> NavigationState | None:
     return find_site(system, navigation, state.position, really, scenario.streams.site_fix(0))
 
 
-def fix_estimate(
-    scenario: Scenario, navigation: NavigationState | None, state: State, target: Array, look: int
-) -> NavigationState | None:
-    """The filter with the fix of the site at `target` [m] shape (3,) that a later look brings."""
-    system = scenario.preset.navigation
-    if system is None or navigation is None:
-        return navigation
-    really = ground_point(scenario, target)
-    return track_site(system, navigation, state.position, really, scenario.streams.site_fix(look))[0]
-
-
 def estimation_error(
     scenario: Scenario, navigation: NavigationState | None, state: State, target: Array
 ) -> Array:
@@ -106,11 +95,29 @@ def open_sensing(
     )
 
 
-def close_sensing(
-    navigation: NavigationState | None, sensing: Sensing, periods: int
+def next_estimate(
+    scenario: Scenario,
+    navigation: NavigationState | None,
+    sensing: Sensing,
+    state: State,
+    site: Array,
+    look: int,
 ) -> NavigationState | None:
-    """The filter as the vehicle's loop left it after so many control periods."""
-    if navigation is None:
+    """The filter at the next look: as the flown interval left it, with the fix that the look brings.
+
+    Args:
+        scenario: the episode.
+        navigation: its filter at the look before; None without one.
+        sensing: what the vehicle's loop made of it.
+        state: the true state.
+        site: [m] shape (3,), the site flown to, in the frame of the policies.
+        look: number of the next look.
+    """
+    system = scenario.preset.navigation
+    if system is None or navigation is None:
         return None
     errors = replace(navigation.errors, accelerometer_bias=sensing.errors.accelerometer_bias)
-    return NavigationState(*sensing.memory, errors, navigation.instant + periods)
+    instant = navigation.instant + scenario.preset.rules.control_periods
+    flown = NavigationState(*sensing.memory, errors, instant)
+    really, draws = ground_point(scenario, site), scenario.streams.site_fix(look)
+    return track_site(system, flown, state.position, really, draws)[0]
