@@ -13,7 +13,7 @@ MINIMUM := .venv-minimum
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help setup lint test test-all test-minimum compare demo bench results-check docs clean
+.PHONY: help setup lint test test-all test-minimum compare demo bench results results-check docs clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-13s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -43,6 +43,9 @@ demo: $(VENV)/.installed  ## a first result: 100 episodes, six policies, and the
 
 bench: $(VENV)/.installed  ## measure the speed of the inner loops
 	$(BIN)/python -m studies.bench $(ARGS)
+
+results: $(VENV)/.installed  ## make every table of docs/results again, what is missing first; hours
+	$(BIN)/python -m studies.results $(ARGS)
 
 results-check: $(VENV)/.installed-dev  ## compare the smaller tables of docs/results with a fresh run
 	$(BIN)/pytest tests/documentation/test_results.py $(ARGS)

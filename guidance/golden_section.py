@@ -49,3 +49,14 @@ def keep_upper(bracket: Bracket) -> Bracket:
     """What is left where the second inner point has the lower value; only `second` is new."""
     low, high = bracket.first, bracket.high
     return Bracket(low, bracket.second, low + _RATIO * (high - low), high)
+
+
+@compile_kernel
+def keep_either(bracket: Bracket, lower: bool) -> Bracket:
+    """`keep_lower` or `keep_upper`, without a branch: for loops that run on vector units."""
+    low = bracket.low if lower else bracket.first
+    high = bracket.second if lower else bracket.high
+    kept = bracket.first if lower else bracket.second
+    step = _RATIO * (high - low)
+    new = high - step if lower else low + step
+    return Bracket(low, new if lower else kept, kept if lower else new, high)

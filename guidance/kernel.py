@@ -45,14 +45,14 @@ def kernel_folder() -> Path:
     return cache_folder() / "kernels" / source_hash()
 
 
-def compile_kernel(function: Function, *, parallel: bool = False) -> Function:
+def compile_kernel(function: Function, *, parallel: bool = False, error_model: str = "python") -> Function:
     """Compile a function on first call, without the GIL; cached on disk where that is possible.
 
     With numba's own switch `NUMBA_DISABLE_JIT=1` it stays Python, for a debugger or a count of covered lines.
     """
     if _numba_config.DISABLE_JIT:
         return function
-    compiled = numba.njit(nogil=True, parallel=parallel)(function)
+    compiled = numba.njit(nogil=True, parallel=parallel, error_model=error_model)(function)
     before = _numba_config.CACHE_DIR
     try:
         _numba_config.CACHE_DIR = str(kernel_folder())
@@ -67,3 +67,11 @@ def compile_kernel(function: Function, *, parallel: bool = False) -> Function:
 def compile_parallel_kernel(function: Function) -> Function:
     """Like `compile_kernel`, with `numba.prange` loops spread over the cores."""
     return compile_kernel(function, parallel=True)
+
+
+def compile_vector_kernel(function: Function) -> Function:
+    """Like `compile_kernel`, but a number over zero is infinite and no error, as in numpy.
+
+    The test for a zero divisor keeps a loop off the vector units.
+    """
+    return compile_kernel(function, error_model="numpy")

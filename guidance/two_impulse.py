@@ -17,14 +17,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from guidance.arrays import Array
-from guidance.golden_section import divide, keep_lower, keep_upper
-from guidance.kernel import compile_kernel
+from guidance.golden_section import Bracket, divide, keep_either
+from guidance.kernel import compile_vector_kernel
 from guidance.lander import Lander
 from guidance.state import State
 from guidance.validation import finite_vector
 
 _SHORTEST, _LONGEST = 0.2, 1.5  # times of flight searched, in free falls to the plane
 _SECTIONS = 22  # of the golden section: 1e-4 of the interval
+_TOGETHER = 16  # points of the lattice: a few vectors of doubles
 
 
 class Approach(NamedTuple):
@@ -45,7 +46,7 @@ class Approach(NamedTuple):
     thrust_acceleration: float
 
 
-@compile_kernel
+@compile_vector_kernel
 def _cost(east: float, north: float, up: float, approach: Approach, time: float) -> float:
     """[m/s] at one time of flight to an offset [m]."""
     vx, vy, vz, g, thrust = approach
@@ -56,25 +57,7 @@ def _cost(east: float, north: float, up: float, approach: Approach, time: float)
     return first + last + 0.5 * (g * last / thrust + first * first / (thrust * time))
 
 
-@compile_kernel
-def least_cost(east: float, north: float, up: float, approach: Approach) -> float:
-    """[m/s] of the cheapest two-impulse landing at an offset [m] from the start."""
-    climb, g = approach.velocity_up, approach.gravity
-    fall = (climb + math.sqrt(max(climb * climb - 2.0 * g * up, 0.0))) / g
-    bracket = divide(_SHORTEST * fall, _LONGEST * fall)
-    at_first = _cost(east, north, up, approach, bracket.first)
-    at_second = _cost(east, north, up, approach, bracket.second)
-    for _ in range(_SECTIONS):
-        if at_first < at_second:
-            bracket, at_second = keep_lower(bracket), at_first
-            at_first = _cost(east, north, up, approach, bracket.first)
-        else:
-            bracket, at_first = keep_upper(bracket), at_second
-            at_second = _cost(east, north, up, approach, bracket.second)
-    return at_first if at_first < at_second else at_second
-
-
-@compile_kernel
+@compile_vector_kernel
 def _fill(
     east: Array,
     north: Array,
@@ -82,9 +65,37 @@ def _fill(
     approach: Approach,
     out: Array,
 ) -> None:
+    """[m/s] of the cheapest two-impulse landing at each offset [m] from the start.
+
+    Neighbours take each step of their golden sections together, so that it runs on the vector units.
+    """
+    climb, g = approach.velocity_up, approach.gravity
+    fall = (climb + math.sqrt(max(climb * climb - 2.0 * g * up, 0.0))) / g
+    whole = divide(_SHORTEST * fall, _LONGEST * fall)
+    place = np.empty(_TOGETHER)
+    bracket, cost = np.empty((4, _TOGETHER)), np.empty((2, _TOGETHER))
     for row in range(north.size):
-        for column in range(east.size):
-            out[row, column] = least_cost(east[column], north[row], up, approach)
+        for start in range(0, east.size, _TOGETHER):
+            for k in range(_TOGETHER):
+                place[k] = east[min(start + k, east.size - 1)]
+                for point in range(4):
+                    bracket[point, k] = whole[point]
+                cost[0, k] = _cost(place[k], north[row], up, approach, whole.first)
+                cost[1, k] = _cost(place[k], north[row], up, approach, whole.second)
+            for _ in range(_SECTIONS):
+                for k in range(_TOGETHER):
+                    lower = cost[0, k] < cost[1, k]
+                    part = keep_either(
+                        Bracket(bracket[0, k], bracket[1, k], bracket[2, k], bracket[3, k]), lower
+                    )
+                    kept = cost[0, k] if lower else cost[1, k]
+                    new = part.first if lower else part.second
+                    found = _cost(place[k], north[row], up, approach, new)
+                    bracket[0, k], bracket[1, k], bracket[2, k], bracket[3, k] = part
+                    cost[0, k] = found if lower else kept
+                    cost[1, k] = kept if lower else found
+            for k in range(min(_TOGETHER, east.size - start)):
+                out[row, start + k] = cost[0, k] if cost[0, k] < cost[1, k] else cost[1, k]
 
 
 def divert_cost(

@@ -69,6 +69,7 @@ class AgentSettings(OffPolicySettings):
     Attributes:
         algorithm: which one.
         layout: observation vector (a name in `rl.environment.encoding.LAYOUTS`).
+        encoder: shipped encoder of the looks, by name: `autoencoder`, or one that learnt on another preset.
         learning_rate: of Adam, until the decay begins.
         final_learning_rate: where the decay ends.
         learning_rate_decay: steps at which its linear decay begins and ends.
@@ -81,6 +82,7 @@ class AgentSettings(OffPolicySettings):
 
     algorithm: AlgorithmName = "td3"
     layout: str = CURVED.name
+    encoder: str = "autoencoder"
     learning_rate: float = 3e-4
     final_learning_rate: float = 3e-5
     learning_rate_decay: tuple[int, int] = (190_000, 250_000)

@@ -18,6 +18,7 @@ from rich.console import Console
 from guidance import solve_pdg, solve_pdg_many
 from guidance.console import one_line_errors, tolerate_encoding
 from guidance.descent.residuals import fly_residuals
+from guidance.rigid_body import DEFAULT_BODY, RigidState, hold_thrust
 from guidance.validation import finite_number
 from hda.flight.episode import advance, begin_flight, fly_legs, observe
 from hda.policy import PrivilegedPolicy
@@ -153,6 +154,19 @@ def measure_bulk(options: Bench) -> dict[str, np.ndarray]:
     return {"a start in bulk (solve_pdg_many, all cores)": np.array(times[1:])}
 
 
+def measure_rigid_body(options: Bench) -> dict[str, np.ndarray]:
+    """Wall time [s] of 5 s of a rigid body under its attitude loop, from the start of each episode."""
+    times = []
+    for episode in range(-1, options.episodes):
+        scenario = sample_scenario(options.preset, 0, max(episode, 0), "tuning")
+        state, wanted = RigidState.parse(scenario.initial_state), np.array([-1000.0, 500.0, 4500.0])
+        start = perf_counter()
+        hold_thrust(state, wanted, 5.0, DEFAULT_BODY)
+        if episode >= 0:
+            times.append(perf_counter() - start)
+    return {"5 s of flight of a rigid body, attitude loop at 10 Hz": np.array(times)}
+
+
 def bench(options: Bench) -> tuple[list[Work], list[SpeedRatio]]:
     """Measure, write times.csv, ratios.csv and provenance.json, and print both tables.
 
@@ -163,7 +177,7 @@ def bench(options: Bench) -> tuple[list[Work], list[SpeedRatio]]:
     finite_number("episodes", options.episodes, at_least=1)
     out, console = open_folder(options.out), Console(width=max(Console().width, 120))
     measured = measure_steps(options) | measure_scans(options.episodes)
-    measured |= measure_plans(options) | measure_bulk(options)
+    measured |= measure_rigid_body(options) | measure_plans(options) | measure_bulk(options)
     works = [Work(name, *np.quantile(seconds, (0.5, 0.99))) for name, seconds in measured.items()]
     works += [Work(wall.name, wall.median, max(wall.seconds)) for wall in measure_terrain(options.repeats)]
     ratios = measure_ratios(options.preset)

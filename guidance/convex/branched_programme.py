@@ -1,6 +1,7 @@
 """The conic programme of flights that share a trunk and then part, one branch to each candidate site.
 
-State, mass and thrust of the trunk's nodes are the same variables in every branch.
+State, mass and thrust of the trunk's nodes are the same variables in every branch. Where no limit on the path
+needs the states, the programme is first solved without them (`guidance.convex.condensed`).
 """
 
 from __future__ import annotations
@@ -16,10 +17,11 @@ from guidance.arrays import Array, Index
 from guidance.convex import constraints
 from guidance.convex.assembly import Assembly, nominal_numbers, once_per_thread
 from guidance.convex.clarabel_solver import DEFAULT_TOLERANCE, SolveStatus
-from guidance.convex.constraint_set import ConstraintSet
+from guidance.convex.condensed import expand, keeps_altitude, landing_moments
+from guidance.convex.constraint_set import ConstraintSet, Family
 from guidance.convex.constraints import Rows
-from guidance.convex.layout import Layout
-from guidance.convex.programme import ConvexSolution
+from guidance.convex.layout import CondensedLayout, Layout
+from guidance.convex.programme import CONSTANT_FAMILIES, ConvexSolution
 from guidance.convex.scaling import ScaledProblem
 
 
@@ -41,16 +43,29 @@ class Branching:
         constraint_set: of each branch.
         branches: number of candidates.
         shared_nodes: nodes of the trunk.
+        condensed: whether the states are left out, and with them the altitude floor.
     """
 
     constraint_set: ConstraintSet
     branches: int
     shared_nodes: int
+    condensed: bool = False
 
-    @property
-    def layout(self) -> Layout:
+    @cached_property
+    def layout(self) -> CondensedLayout:
         """Of one branch alone, trunk included."""
+        return CondensedLayout(self.constraint_set.nodes) if self.condensed else self.whole_layout
+
+    @cached_property
+    def whole_layout(self) -> Layout:
+        """The same with its states."""
         return Layout(self.constraint_set.nodes)
+
+    @cached_property
+    def families(self) -> list[Family]:
+        """Constraint functions of a branch, in row order."""
+        chosen = self.constraint_set
+        return chosen.condensed_families if self.condensed else chosen.families
 
     @cached_property
     def columns(self) -> Index:
@@ -74,20 +89,29 @@ class Branching:
         Args:
             scaled: numbers of each branch in equal units, each with its own target as origin.
         """
-        origin = scaled[0].position
+        origin, gravity = scaled[0].position, scaled[0].gravity  # at the first target, the origin of all
         parts = []
         for branch, numbers in enumerate(scaled):
             aim = origin - numbers.position  # this target as seen from the first
-            gravity = scaled[0].gravity  # at the first target, the origin of all
-            shared = replace(numbers, position=origin, sight_apex=aim, gravity=gravity)
-            for place, family in enumerate(self.constraint_set.families):
-                part = family(self.layout, shared)
+            own = replace(numbers, gravity=gravity)
+            shared = replace(own, position=origin, sight_apex=aim)
+            for place, family in enumerate(self.families):
+                if (branch, place) in self._constant:
+                    parts.append(self._constant[branch, place])
+                    continue
+                part = family(self.layout, own if family is landing_moments else shared)
                 if family is constraints.landing:
                     part = replace(part, bound=np.concatenate([aim, numbers.target_velocity]))
                 moved = self._moved(part, branch, place)
-                if moved is not None:
-                    parts.append(moved)
-        return parts
+                if family in CONSTANT_FAMILIES:
+                    self._constant[branch, place] = moved
+                parts.append(moved)
+        return [part for part in parts if part is not None]
+
+    @cached_property
+    def _constant(self) -> dict[tuple[int, int], Rows | None]:
+        """Rows that are the same at every solve, by branch and place."""
+        return {}
 
     def _moved(self, part: Rows, branch: int, place: int) -> Rows | None:
         """Rows in the columns of a branch, without the cones that bind the trunk only.
@@ -140,27 +164,48 @@ class BranchedProgramme:
         cost[self.branching.columns[:, self.branching.layout.log_mass[-1]]] = -weights
         return cost
 
-    def solve(self, scaled: Sequence[ScaledProblem], weights: Array) -> list[ConvexSolution] | None:
-        """Least weighted propellant; each branch as a solution of its own, or None if there is none."""
-        rows = self.branching.rows(scaled)
+    def solve(self, scaled: Sequence[ScaledProblem], weights: Array) -> list[ConvexSolution]:
+        """Least weighted propellant: each branch as a solution of its own, all with the same status."""
+        rows, branching = self.branching.rows(scaled), self.branching
         answer = self._assembly.solve(rows, self._cost(weights))
-        if answer.status is not SolveStatus.SOLVED:
-            return None
-        layout = self.branching.layout
-        return [
-            ConvexSolution(
-                replace(answer, primal=answer.primal[columns]),
-                layout,
-                scaled[0],
-                rows,
-                -float(scaled[0].kappa * answer.primal[columns[layout.log_mass[-1]]]),
-                np.nan,
-            )
-            for columns in self.branching.columns
-        ]
+        condensed, first, out = branching.layout, scaled[0], []
+        for columns in branching.columns:
+            primal, value = answer.primal[columns], np.nan
+            if answer.status is SolveStatus.SOLVED:
+                value = -float(first.kappa * primal[condensed.log_mass[-1]])
+                if branching.condensed:
+                    primal = expand(condensed, first, primal)
+            branch = replace(answer, primal=primal)
+            out.append(ConvexSolution(branch, branching.whole_layout, first, rows, value, np.nan))
+        return out
 
 
 @once_per_thread
 def branched_programme(branching: Branching) -> BranchedProgramme:
     """The assembled programme of a Branching: built once per thread, then kept."""
     return BranchedProgramme(branching)
+
+
+def solve_branches(
+    constraint_set: ConstraintSet, shared_nodes: int, scaled: Sequence[ScaledProblem], weights: Array
+) -> list[ConvexSolution] | None:
+    """Least weighted propellant of branches that share some nodes.
+
+    Args:
+        constraint_set: of each branch.
+        shared_nodes: nodes of the trunk.
+        scaled: numbers of each branch in equal units, each with its own target as origin.
+        weights: shape (branches,).
+
+    Returns:
+        Each branch as a solution of its own, seen from the first target; None if there are none.
+    """
+    branching = Branching(constraint_set, len(scaled), shared_nodes)
+    if constraint_set.can_condense:
+        found = branched_programme(replace(branching, condensed=True)).solve(scaled, weights)
+        if found[0].answer.status is SolveStatus.INFEASIBLE:
+            return None
+        if found[0].solved and all(keeps_altitude(part.layout, part.answer.primal) for part in found):
+            return found
+    found = branched_programme(branching).solve(scaled, weights)
+    return found if found[0].solved else None

@@ -23,9 +23,10 @@ from guidance.convex.scaling import ScaledProblem
 from guidance.descent.problem import LandingProblem
 from guidance.descent.trajectory import Trajectory
 
-_CONSTANT_FAMILIES: frozenset[Family] = frozenset(
+CONSTANT_FAMILIES: frozenset[Family] = frozenset(
     {burnt_mass, constraints.altitude_floor, constraints.thrust_cone}
 )
+"""Those whose rows are the same at every solve."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +116,7 @@ class ConvexTemplate:
         self._constant: dict[Family, Rows] = {}
         nominal = nominal_numbers(constraint_set.nodes)
         rows = self.rows(nominal)
-        for family in _CONSTANT_FAMILIES.intersection(self._families):
+        for family in CONSTANT_FAMILIES.intersection(self._families):
             self._constant[family] = family(self.layout, nominal)
         self._assembly = Assembly(rows, self.cost(False), tolerance)
         timed = [

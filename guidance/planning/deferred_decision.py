@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from guidance.arrays import Array
-from guidance.convex.branched_programme import Branching, branched_programme
+from guidance.convex.branched_programme import solve_branches
 from guidance.convex.clarabel_solver import SolveStatus
 from guidance.convex.constraint_set import ConstraintSet
 from guidance.convex.programme import ConvexSolution
@@ -100,9 +100,7 @@ class _Question:
             numbers = scale_problem(problem, self.time, self.nodes, history)
             scaled.append(replace(numbers, propellant=limit / numbers.kappa))
         chosen = ConstraintSet.of(self.problems[0], self.nodes)
-        return branched_programme(Branching(chosen, len(self.problems), shared_nodes)).solve(
-            scaled, self.weights
-        )
+        return solve_branches(chosen, shared_nodes, scaled, self.weights)
 
     def refine(
         self, shared_nodes: int, solutions: list[ConvexSolution], log_mass: list[Array]

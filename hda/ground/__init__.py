@@ -10,11 +10,13 @@ from typing import TYPE_CHECKING
 from guidance.exports import lazy_exports
 
 if TYPE_CHECKING:
+    from hda.ground.detail import GroundDetail
     from hda.ground.library import SPLITS, Ground, load_tile, prepare_tiles
     from hda.ground.own_terrain import OwnTerrain, open_own_terrain
     from hda.ground.tile import Tile, make_tile
 
 _HOMES = {
+    "hda.ground.detail": ("GroundDetail",),
     "hda.ground.library": (
         "SPLITS",
         "Ground",
@@ -34,6 +36,7 @@ _HOMES = {
 __all__ = [
     "SPLITS",
     "Ground",
+    "GroundDetail",
     "OwnTerrain",
     "Tile",
     "load_tile",

@@ -17,7 +17,7 @@ import tempfile
 import zlib
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import lru_cache, partial
 from pathlib import Path
 
@@ -25,7 +25,7 @@ import numpy as np
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from guidance.kernel import cache_folder
-from hda.ground.own_terrain import OWN_SPLIT, OwnTerrain, cut_tile
+from hda.ground.own_terrain import OWN_SPLIT, OwnTerrain, add_detail, cut_tile
 from hda.ground.tile import Tile, make_tile
 from hda.safety.criteria import SafetyCriteria
 from hda.terrain.generator import TerrainParameters, generate_terrain
@@ -44,7 +44,12 @@ only."""
 FRESH_SPLIT = "fresh"
 """Episode k of a study flies over the k-th of its tiles, so that up to 5000 episodes are independent."""
 
-_LAYERS = {"elevation": np.float32, "probability": np.float32, "deterministic": np.bool_}
+_LAYERS = {
+    "elevation": np.float32,
+    "probability": np.float32,
+    "deterministic": np.bool_,
+    "added": np.uint8,  # where something was
+}
 _verified: set[Path] = set()
 
 
@@ -98,11 +103,16 @@ def check_split(number: int, split: str, ground: Ground | None = None) -> None:
 
 def build_tile(ground: Ground, number: int) -> Tile:
     """Generate, or cut from the user's file, and assess one tile, without the cache."""
-    if isinstance(ground.terrain, OwnTerrain):
-        dem = cut_tile(ground.terrain, number)
+    terrain, kinds = ground.terrain, None
+    if isinstance(terrain, OwnTerrain):
+        dem = cut_tile(terrain, number)
+        if terrain.detail is not None:
+            added = add_detail(terrain, terrain.detail, number)
+            dem, kinds = dem + added.relief, added.kinds
     else:
-        dem = generate_terrain(ground.terrain, np.random.default_rng(number))
-    return make_tile(dem, ground.criteria, number, ground.terrain.maximum_elevation)
+        dem = generate_terrain(terrain, np.random.default_rng(number))
+    tile = make_tile(dem, ground.criteria, number, terrain.maximum_elevation)
+    return tile if kinds is None else replace(tile, added=kinds)
 
 
 def load_tile(ground: Ground, number: int, split: str) -> Tile:
@@ -206,6 +216,8 @@ def _write(folder: Path, tile: Tile) -> None:
     sums: dict[str, int] = {}
     for name in _LAYERS:
         layer = getattr(tile, name)
+        if layer is None:
+            continue
         np.save(folder / f"{name}.npy", layer, allow_pickle=False)
         sums[name] = zlib.crc32(np.ascontiguousarray(layer).tobytes())
     (folder / "checksums.json").write_text(json.dumps(sums, sort_keys=True))
@@ -216,7 +228,8 @@ def _read(folder: Path, number: int) -> Tile | None:
     layers = {}
     with suppress(Exception):  # a damaged header makes numpy raise errors of many kinds (EOF, token, syntax)
         sums = json.loads((folder / "checksums.json").read_text())
-        for name, kind in _LAYERS.items():
+        for name in sums:
+            kind = _LAYERS[name]
             layer = np.load(folder / f"{name}.npy", mmap_mode="r", allow_pickle=False).view(np.ndarray)
             if layer.dtype != kind or layer.ndim != 2:  # the checksum covers the content, not the header
                 return None

@@ -25,17 +25,22 @@ class Tile:
         elevation: [m] shape (rows, columns); its maximum is the target plane.
         probability: shape (rows, columns), V_P in [0, 1].
         deterministic: shape (rows, columns), V_D: whether the cell is safe.
+        added: shape (rows, columns), what was added to a user's ground (`hda.ground.detail`): bits
+            `ADDED_CRATER` and `ADDED_ROCK`; None where nothing was.
     """
 
     number: int
     elevation: NDArray[np.float32]
     probability: NDArray[np.float32]
     deterministic: NDArray[np.bool_]
+    added: NDArray[np.uint8] | None = None
 
     def __post_init__(self) -> None:
-        """Check that the three layers belong together, and freeze them."""
-        for name in ("elevation", "probability", "deterministic"):
+        """Check that the layers belong together, and freeze them."""
+        for name in ("elevation", "probability", "deterministic", "added"):
             layer = getattr(self, name)
+            if layer is None:
+                continue
             if layer.shape != self.elevation.shape or layer.ndim != 2:
                 raise ValueError(f"{name} must have shape {self.elevation.shape}, got {layer.shape}")
             layer.flags.writeable = False

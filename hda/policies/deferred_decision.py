@@ -23,8 +23,9 @@ from guidance.validation import finite_number
 from hda.policies.adjusted_descent import AdjustedDescent
 from hda.policies.belief import GroundBelief
 from hda.policies.hazard_aware import HazardAwareSite, fuse_look
+from hda.policies.landing_dispersion import landing_probability
 from hda.policies.planned_descent import DescentMemory
-from hda.policies.site_price import HazardAwareWeights, landing_probability
+from hda.policies.site_price import HazardAwareWeights
 from hda.policies.surroundings import infer_unseen
 from hda.policy import Decision, DecisionStatus, PlanCommand
 from hda.task.observation import Observation, ScenarioView
@@ -150,12 +151,13 @@ class DeferredDecisionPolicy:
         if height <= 0.0 or (not first and observation.time_to_go <= self.options.commit_time):
             return self._fly_to(observation.target, observation, replace(memory, committed=True))
         safe = infer_unseen(belief.probability(), belief.seen)
-        landing = landing_probability(safe, self.options.dispersion)
         present = belief.cell(observation.target)
-        if memory.committed and present is not None and landing[present] >= self.options.keep_probability:
-            return self._fly_to(observation.target, observation, memory)
+        if memory.committed and present is not None:
+            landing = landing_probability(safe, self.options.dispersion, present)
+            if landing >= self.options.keep_probability:
+                return self._fly_to(observation.target, observation, memory)
         price = self._ranking().price_by(safe, observation, memory.view, belief)
-        candidates = self._choose(price, landing, observation, belief)
+        candidates = self._choose(price, safe, observation, belief)
         trunk = None if memory.committed else self._defer(observation, candidates, memory)
         if trunk is None:
             return self._fly_to(candidates.sites[0], observation, replace(memory, committed=True))
@@ -173,7 +175,7 @@ class DeferredDecisionPolicy:
         )
 
     def _choose(
-        self, price: Array, landing: NDArray[np.float32], observation: Observation, belief: GroundBelief
+        self, price: Array, safe: NDArray[np.float32], observation: Observation, belief: GroundBelief
     ) -> Candidates:
         """The best site, then the best of those far enough from all before, and so on."""
         options, price = self.options, price.copy()
@@ -196,7 +198,8 @@ class DeferredDecisionPolicy:
         sites = np.array([observation.settled(belief.site(*cell, plane)) for cell in cells])
         if cells[0] == present:
             sites[0] = observation.target
-        return Candidates(sites, np.array([float(landing[cell]) for cell in cells]))
+        dispersion = self.options.dispersion
+        return Candidates(sites, np.array([landing_probability(safe, dispersion, cell) for cell in cells]))
 
     def _defer(
         self, observation: Observation, candidates: Candidates, memory: DeferredDecisionMemory

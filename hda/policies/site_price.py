@@ -17,17 +17,26 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from guidance.arrays import Array
-from guidance.kernel import compile_kernel
 from guidance.two_impulse import divert_cost
 from guidance.validation import finite_number
 from hda.policies.belief import GroundBelief
-from hda.policies.summed_area import sum_box, summed_area
+from hda.policies.cell_prices import (
+    Lattice,
+    NextLook,
+    Outlook,
+    Prices,
+    price_blindly,
+    price_cells,
+    read_part,
+    sum_by_likelihood,
+)
+from hda.policies.landing_dispersion import dispersion_weights
+from hda.policies.summed_area import SummedArea
 from hda.task.observation import Observation, ScenarioView
 
 LATTICE = 8
@@ -66,36 +75,6 @@ class HazardAwareWeights:
             finite_number(name, getattr(self, name), above=0.0)
 
 
-class _Prices(NamedTuple):
-    """What the kernel needs of `HazardAwareWeights`."""
-
-    failure: float
-    divert: float
-    surprise_area: float
-    island_area: float
-    divert_slope: float
-
-
-class NextLook(NamedTuple):
-    """Where the lander will be at the next look, coasting until then; lengths from the square's corner.
-
-    Attributes:
-        east: [m].
-        north: [m].
-        height: [m] above the plane.
-        half_width_slope: half the look's width over the slant range.
-        nadir_radius: [m] greatest distance from the point below the lander at which ground is seen.
-        useful: whether it comes early enough to act on.
-    """
-
-    east: float
-    north: float
-    height: float
-    half_width_slope: float
-    nadir_radius: float
-    useful: bool
-
-
 def predict_next_look(
     observation: Observation, view: ScenarioView, corner: tuple[int, int], commit_time: float
 ) -> NextLook:
@@ -113,43 +92,6 @@ def predict_next_look(
     )
 
 
-def landing_probability(safe: NDArray[np.float32], dispersion: float) -> NDArray[np.float32]:
-    """Probability that a touchdown aimed at each cell's centre ends on a safe cell.
-
-    Args:
-        safe: shape (n, n), probability that each cell is safe.
-        dispersion: [m] standard deviation of the touchdown along each axis, Gaussian, up to 2.5 m.
-
-    Returns:
-        Shape (n, n); 0 within two cells of the square's edge.
-    """
-    edges = np.array([math.erf(edge / (dispersion * math.sqrt(2.0))) for edge in (0.5, 1.5, 2.5)])
-    weights = np.diff(edges, prepend=0.0) * np.array([1.0, 0.5, 0.5]) / edges[-1]
-    out = np.empty_like(safe)
-    _smooth_into(safe, weights, out)
-    return out
-
-
-@compile_kernel
-def _smooth_into(safe: NDArray[np.float32], weights: Array, out: NDArray[np.float32]) -> None:
-    """Weighted mean over five cells along each axis; beyond the square nothing is safe."""
-    n = safe.shape[0]
-    across = np.zeros((n, n))
-    for row in range(n):
-        for column in range(2, n - 2):
-            total = weights[0] * safe[row, column]
-            for step in (1, 2):
-                total += weights[step] * (safe[row, column - step] + safe[row, column + step])
-            across[row, column] = total
-    out[:] = 0.0
-    for row in range(2, n - 2):
-        for column in range(n):
-            total = weights[0] * across[row, column]
-            for step in (1, 2):
-                total += weights[step] * (across[row - step, column] + across[row + step, column])
-            out[row, column] = total
-
-
 def propellant_map(observation: Observation, view: ScenarioView, belief: GroundBelief) -> Array:
     """[kg] estimate for landing at each lattice point of the square, shape (m, m)."""
     points = np.arange(belief.side // LATTICE + 2, dtype=np.float64) * LATTICE
@@ -163,87 +105,13 @@ def propellant_map(observation: Observation, view: ScenarioView, belief: GroundB
     )
 
 
-@compile_kernel
-def _split_by_likelihood(
-    safe: NDArray[np.float32], next_look: NextLook, known: NDArray[np.float32], unknown: NDArray[np.float32]
-) -> None:
-    """Write what is probably safe, and what safe ground the next look may show among the rest."""
-    for row in range(safe.shape[0]):
-        north = (row + 0.5 - next_look.north) ** 2
-        for column in range(safe.shape[1]):
-            across = north + (column + 0.5 - next_look.east) ** 2
-            likely = safe[row, column] > 0.5
-            seen = across <= next_look.nadir_radius**2
-            known[row, column] = safe[row, column] if likely else 0.0
-            unknown[row, column] = safe[row, column] if not likely and seen else 0.0
-
-
-class _Outlook(NamedTuple):
-    """The next look, and integral images of the known and of the unknown safe ground."""
-
-    look: NextLook
-    known: Array
-    unknown: Array
-
-
-class _Lattice(NamedTuple):
-    """Propellant [kg] on the lattice; for each cell along an axis the point before it, and how far beyond."""
-
-    propellant: Array
-    point: NDArray[np.int64]
-    beyond: Array
-
-
-@compile_kernel
-def _interpolate(lattice: _Lattice, row: int, column: int) -> float:
-    """[kg] bilinear, at a cell's centre."""
-    propellant = lattice.propellant
-    i, s, j, t = lattice.point[row], lattice.beyond[row], lattice.point[column], lattice.beyond[column]
-    price = (1.0 - s) * ((1.0 - t) * propellant[i, j] + t * propellant[i, j + 1])
-    return price + s * ((1.0 - t) * propellant[i + 1, j] + t * propellant[i + 1, j + 1])
-
-
-@compile_kernel
-def _price_blindly(
-    landing: NDArray[np.float32],
-    lattice: _Lattice,
-    prices: _Prices,
-    share: float,
-    out: Array,
-) -> float:
-    """Fill J as if no later look, or each with a share of the failures left, helped; the least J without."""
-    least, n = np.inf, landing.shape[0]
-    for row in range(n):
-        for column in range(n):
-            price, risk = _interpolate(lattice, row, column), 1.0 - landing[row, column]
-            out[row, column] = price + risk * (prices.divert + prices.failure * share)
-            least = min(least, price + risk * (prices.divert + prices.failure))
-    return least
-
-
-@compile_kernel
-def _price_cells(
-    landing: NDArray[np.float32],
-    outlook: _Outlook,
-    lattice: _Lattice,
-    prices: _Prices,
-    most: float,
-    out: Array,
-) -> None:
-    """Raise to J what is priced at no more than `most` where every failure is averted."""
-    next_look, n = outlook.look, landing.shape[0]
-    height = next_look.height
-    divert_distance = max(prices.divert_slope * height, 1.0)
-    for row in range(n):
-        for column in range(n):
-            if out[row, column] > most:
-                continue
-            price, risk = _interpolate(lattice, row, column), 1.0 - landing[row, column]
-            across = (column + 0.5 - next_look.east) ** 2 + (row + 0.5 - next_look.north) ** 2
-            half_width = next_look.half_width_slope * math.sqrt(across + height * height)
-            exponent = sum_box(outlook.known, row, column, divert_distance) / prices.surprise_area
-            exponent += sum_box(outlook.unknown, row, column, half_width) / prices.island_area
-            out[row, column] = price + risk * (prices.divert + prices.failure * math.exp(-exponent))
+def _between_points(propellant: Array, cells: int) -> Lattice:
+    place = (np.arange(cells) + 0.5) / LATTICE
+    point = place.astype(np.int64)
+    beyond = place - point
+    before, after = (propellant.take(point + step, axis=1) for step in (0, 1))  # C order, for the kernels
+    rows = (1.0 - beyond) * before + beyond * after
+    return Lattice(rows, point, beyond)
 
 
 def price_sites(
@@ -264,20 +132,20 @@ def price_sites(
             a fraction of the time.
     """
     n = safe.shape[0]
-    down = (np.arange(n) + 0.5) / LATTICE
-    lattice = _Lattice(propellant, down.astype(np.int64), down - down.astype(np.int64))
-    prices = _Prices(
+    lattice, out = _between_points(propellant, n), np.empty((n, n))
+    prices = Prices(
         weights.failure_cost,
         weights.divert_cost,
         weights.surprise_area,
         weights.island_area,
         weights.divert_slope,
+        dispersion_weights(weights.dispersion),
     )
-    out, landing = np.empty((n, n)), landing_probability(safe, weights.dispersion)
-    least = _price_blindly(landing, lattice, prices, 0.0 if next_look.useful else 1.0, out)
+    least = price_blindly(safe, lattice, prices, 0.0 if next_look.useful else 1.0, out)
     if next_look.useful:
-        known, unknown = np.empty_like(safe), np.empty_like(safe)
-        _split_by_likelihood(safe, next_look, known, unknown)
-        outlook = _Outlook(next_look, summed_area(known), summed_area(unknown))
-        _price_cells(landing, outlook, lattice, prices, least + within, out)
+        most = least + within
+        first, last, widest = read_part(out, most, next_look, prices)
+        known, unknown = (SummedArea(np.empty((last - first + 1, widest + 1)), first, n) for _ in range(2))
+        sum_by_likelihood(safe, next_look, known, unknown)
+        price_cells(safe, Outlook(next_look, known, unknown), lattice, prices, most, out)
     return out

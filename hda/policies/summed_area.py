@@ -1,38 +1,52 @@
-"""Integral images: the sum over any rectangle of cells in four reads."""
+"""Integral images: the sum over any rectangle of cells in four reads.
+
+Entry (i, j) of an image of n x n cells is the sum over rows below i and columns below j. Only the part of it
+is kept that will be read.
+"""
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
+from typing import NamedTuple
 
 from guidance.arrays import Array
 from guidance.kernel import compile_kernel
 
 
-def summed_area(density: NDArray[np.float32]) -> Array:
-    """Integral image, shape (n + 1, n + 1): entry (i, j) is the sum over rows below i and columns below j."""
-    out = np.zeros((density.shape[0] + 1, density.shape[1] + 1))
-    _sum_into(density, out)
-    return out
+class SummedArea(NamedTuple):
+    """Part of an integral image.
+
+    Attributes:
+        sums: shape (rows, columns), its entries from row `first` and column 0 on.
+        first: row of the first entries.
+        cells: n.
+    """
+
+    sums: Array
+    first: int
+    cells: int
 
 
 @compile_kernel
-def _sum_into(density: NDArray[np.float32], out: Array) -> None:
-    rows, columns = density.shape
-    below = np.zeros(columns)
-    for row in range(rows):
-        total = 0.0
-        for column in range(columns):
-            below[column] += density[row, column]
-            total += below[column]
-            out[row + 1, column + 1] = total
+def add_two_rows(below: tuple[Array, Array], out: tuple[Array, Array]) -> None:
+    """Write a row of two integral images from the sums of their columns so far.
+
+    Two sums run side by side, since each addition waits for the one before.
+    """
+    below_first, below_second = below
+    first_out, second_out = out
+    first, second = 0.0, 0.0
+    first_out[0], second_out[0] = first, second
+    for column in range(first_out.size - 1):
+        first += below_first[column]
+        second += below_second[column]
+        first_out[column + 1] = first
+        second_out[column + 1] = second
 
 
 @compile_kernel
-def sum_box(area: Array, row: int, column: int, half: float) -> float:
+def sum_box(area: SummedArea, row: int, column: int, half: float) -> float:
     """Sum over the cells within `half` of a cell along each axis."""
-    n = area.shape[0] - 1
-    cells = int(half)
-    low_row, high_row = max(row - cells, 0), min(row + cells + 1, n)
-    low, high = max(column - cells, 0), min(column + cells + 1, n)
-    return area[high_row, high] - area[low_row, high] - area[high_row, low] + area[low_row, low]
+    sums, cells = area.sums, int(half)
+    low_row, high_row = max(row - cells, 0) - area.first, min(row + cells + 1, area.cells) - area.first
+    low, high = max(column - cells, 0), min(column + cells + 1, area.cells)
+    return sums[high_row, high] - sums[low_row, high] - sums[high_row, low] + sums[low_row, low]

@@ -5,21 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 from rich.console import Console
 
+from hda.ground.detail import GroundDetail
 from hda.ground.elevation_file import NoData
 from hda.ground.library import Ground, load_tile, prepare_tiles
 from hda.ground.own_terrain import OWN_SPLIT, OwnTerrain, open_own_terrain
-from hda.ground.tile import Tile
 from hda.ground.undeclared_voids import name_tiles
+from hda.task.first_target import describe_lack, probe_tile
 from hda.task.presets import Preset, find_preset
-from hda.task.rules import StartConditions
-
-_DRAWS = 10_000
-_FOUND = 20
-"""A tile on which so few of the draws are first targets is not flown: an episode that makes as many draws of
-its own would then find none with a probability of 2e-9 and more."""
 
 
 def place_on_terrain(setting: Preset, terrain: OwnTerrain, workers: int) -> Preset:
@@ -33,20 +27,21 @@ def place_on_terrain(setting: Preset, terrain: OwnTerrain, workers: int) -> Pres
     Raises:
         ValueError: no tile has enough hazard.
     """
-    placed = replace(setting, name=f"{setting.name}-{terrain.file.stem}", terrain=terrain)
+    words = [setting.name, terrain.file.stem]
+    if terrain.detail is not None:
+        words.append(terrain.detail.rock_abundance)
+    placed = replace(setting, name="-".join(words), terrain=terrain)
     ground = Ground(terrain, placed.criteria)
     prepare_tiles(ground, OWN_SPLIT, workers)
     probes = {
-        number: _probe_tile(load_tile(ground, number, OWN_SPLIT), setting.start) for number in terrain.tiles
+        number: probe_tile(load_tile(ground, number, OWN_SPLIT), setting.start) for number in terrain.tiles
     }
     too_safe = tuple(number for number, (enough, _) in probes.items() if not enough)
     if not too_safe:
         return placed
-    start = setting.start
+    most = max(probes[number][1] for number in too_safe)
     lacking = (
-        f"first targets with at least {start.hazard_share:.0%} hazard within {start.hazard_radius:g} m: fewer"
-        f" than {_FOUND} found in {_DRAWS} draws (the most was"
-        f" {max(probes[number][1] for number in too_safe):.1%}); a smaller hazard_share (--hazard-share)"
+        f"{describe_lack(setting.start)} (the most was {most:.1%}); a smaller hazard_share (--hazard-share)"
         " allows safer ground"
     )
     if len(too_safe) == len(terrain.tiles):
@@ -61,19 +56,6 @@ def place_on_terrain(setting: Preset, terrain: OwnTerrain, workers: int) -> Pres
     return replace(placed, terrain=replace(terrain, too_safe=too_safe))
 
 
-def _probe_tile(tile: Tile, start: StartConditions) -> tuple[bool, float]:
-    """Whether enough draws are first targets, and the most hazard that was seen around one."""
-    rng, area = np.random.default_rng(tile.number), start.target_area
-    found, most = 0, 0.0
-    for _ in range(_DRAWS):
-        share = tile.hazard_share(np.array([area.draw(rng), area.draw(rng)]), start.hazard_radius)
-        most = max(most, share)
-        found += share >= start.hazard_share
-        if found == _FOUND:
-            return True, most
-    return False, most
-
-
 def place_preset(
     preset: str | Preset,
     file: Path,
@@ -82,6 +64,7 @@ def place_preset(
     band: int | None = None,
     nodata: NoData = None,
     flat_is_ground: bool = False,
+    detail: GroundDetail | None = None,
     hazard_share: float | None = None,
     workers: int = 2,
 ) -> Preset:
@@ -99,11 +82,12 @@ def place_preset(
         nodata: numbers in the file that mean unknown ground, one or several, besides that which it declares.
         flat_is_ground: an area of one exact height is ground, though it looks like a value that stands for
             unknown ground.
+        detail: hazards that are added to a model with posts of more than 1 m, which cannot show them.
         hazard_share: in place of the preset's; a smaller one lets episodes begin over safer ground.
         workers: processes that build tiles.
 
     Returns:
-        The preset, named after both.
+        The preset, named after both, and after the abundance of rocks where detail is added.
 
     Raises:
         ValueError: an argument is out of range, the file cannot be used, or no tile has enough places for a
@@ -112,5 +96,7 @@ def place_preset(
     setting = find_preset(preset)
     if hazard_share is not None:
         setting = replace(setting, start=replace(setting.start, hazard_share=hazard_share))
-    terrain = open_own_terrain(file, pixel_size, band=band, nodata=nodata, flat_is_ground=flat_is_ground)
+    terrain = open_own_terrain(
+        file, pixel_size, band=band, nodata=nodata, flat_is_ground=flat_is_ground, detail=detail
+    )
     return place_on_terrain(setting, terrain, workers)

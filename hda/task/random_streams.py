@@ -12,6 +12,7 @@ many words follow, and these; the count is zero for the others, so that no two s
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,7 @@ from numpy.typing import NDArray
 from guidance.arrays import Array
 from hda.navigation.sensor_errors import FixDraws, ReadingDraws, draw_fix, draw_readings
 from hda.sensing.ranging import ScanDraws, draw_scan
+from hda.task.look_noise import POOL, draw_normals
 
 _SCENARIO, _SENSOR, _ACTUATOR, _POLICY, _NAVIGATION = range(5)
 _WORD = 2**32
@@ -48,13 +50,18 @@ class EpisodeStreams:
         if self.episode >= _WORD:
             raise ValueError(f"episode must be below 2^32, got {self.episode!r}")
 
-    def _generator(self, *key: int) -> np.random.Generator:
+    @property
+    def _entropy(self) -> list[int]:
+        """Words of the seed that all streams share."""
         entropy = [int(self.study_seed) % _WORD, int(self.episode)]
         rest = int(self.study_seed) // _WORD
         if rest:
             words = [rest >> shift & _WORD - 1 for shift in range(0, rest.bit_length(), 32)]
             entropy += [len(words), *words]
-        sequence = np.random.SeedSequence(entropy, spawn_key=key)
+        return entropy
+
+    def _generator(self, *key: int) -> np.random.Generator:
+        sequence = np.random.SeedSequence(self._entropy, spawn_key=key)
         return np.random.Generator(np.random.PCG64(sequence))
 
     def scenario(self) -> np.random.Generator:
@@ -66,8 +73,8 @@ class EpisodeStreams:
         return self._generator(_POLICY)
 
     def look(self, index: int, pixels: int) -> NDArray[np.float32]:
-        """Standard normal noise of look `index`, shape (pixels, pixels)."""
-        return self._generator(_SENSOR, index).standard_normal((pixels, pixels), dtype=np.float32)
+        """Standard normal noise of look `index`, shape (pixels, pixels); read-only."""
+        return _draw_look(self, index, pixels)
 
     def scan(self, index: int, rays: int) -> ScanDraws:
         """All that chance does to the scan of look `index`, of rays x rays."""
@@ -96,4 +103,20 @@ class EpisodeStreams:
 
     def thrust_error(self, index: int, bound: float) -> float:
         """Relative thrust error of interval `index`, uniform in [-bound, bound]."""
-        return float(self._generator(_ACTUATOR, index).uniform(-bound, bound))
+        return _draw_thrust_error(self, index, bound)
+
+
+@lru_cache(maxsize=32)
+def _draw_look(streams: EpisodeStreams, index: int, pixels: int) -> NDArray[np.float32]:
+    """Kept for the other policies that fly the episode."""
+    entropy = streams._entropy
+    words = [*entropy, *[0] * (POOL - len(entropy)), _SENSOR, index]
+    noise = draw_normals(np.array(words, dtype=np.uint32), (pixels, pixels))
+    noise.flags.writeable = False
+    return noise
+
+
+@lru_cache(maxsize=64)
+def _draw_thrust_error(streams: EpisodeStreams, index: int, bound: float) -> float:
+    """Kept as `_draw_look` is."""
+    return float(streams._generator(_ACTUATOR, index).uniform(-bound, bound))

@@ -14,12 +14,11 @@ from hda.ground.library import FRESH_SPLIT, Ground, load_tile, tile_numbers
 from hda.ground.tile import Tile
 from hda.navigation.sensor_errors import SensorErrors, draw_sensor_errors
 from hda.safety.touchdown_stance import NO_GROUND, Footing, make_footing
+from hda.task.first_target import describe_lack, draw_target, offers_targets
 from hda.task.observation import ScenarioView
 from hda.task.presets import Preset, find_preset
 from hda.task.random_streams import EpisodeStreams
 from hda.task.rules import StartConditions
-
-_TARGET_DRAWS = 10_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +32,8 @@ class Scenario:
         tile: the ground, with the true safety map.
         initial_state: state at t = 0.
         nominal_target: [m] shape (3,), first target, on the target plane.
+        left_out: numbers of tiles that were drawn before this one, and over which no episode begins, for want
+            of hazard around a first target.
     """
 
     preset: Preset
@@ -41,6 +42,7 @@ class Scenario:
     tile: Tile
     initial_state: State
     nominal_target: Array
+    left_out: tuple[int, ...] = ()
 
     @property
     def sensor_errors(self) -> SensorErrors | None:
@@ -96,26 +98,6 @@ def ground_point(scenario: Scenario, site: Array) -> Array:
     return site - np.array([error[0], error[1], vertical])
 
 
-def draw_target(tile: Tile, start: StartConditions, plane: float, rng: np.random.Generator) -> Array:
-    """Draw the first target: uniform over the target area, where enough of the ground around is unsafe.
-
-    Raises:
-        ValueError: no such place was found on the tile in 10 000 draws; the message says what the best was.
-    """
-    area, best = start.target_area, 0.0
-    for _ in range(_TARGET_DRAWS):
-        target = np.array([area.draw(rng), area.draw(rng), plane])
-        share = tile.hazard_share(target, start.hazard_radius)
-        if share >= start.hazard_share:
-            return target
-        best = max(best, share)
-    raise ValueError(
-        f"tile {tile.number}: no target with at least {start.hazard_share:.0%} hazard"
-        f" within {start.hazard_radius:g} m found in {_TARGET_DRAWS} draws (the most was {best:.1%});"
-        " a smaller start.hazard_share allows safer ground"
-    )
-
-
 def draw_state(target: Array, start: StartConditions, rng: np.random.Generator) -> State:
     """Draw the initial state around `target`."""
     altitude = start.altitude.draw(rng)
@@ -140,7 +122,9 @@ def draw_scenario(
     tile_numbers: Sequence[int],
     load: Callable[[int], Tile],
 ) -> Scenario:
-    """Draw a scenario on one of the given tiles.
+    """Draw a scenario on one of the given tiles that have first targets.
+
+    A tile that has too few of them is passed over: another is drawn from the rest, by the same stream.
 
     Args:
         preset: the setting.
@@ -148,16 +132,28 @@ def draw_scenario(
         split: name of the split that the tiles are from; on `fresh` the episode's number chooses the tile.
         tile_numbers: at least one.
         load: gives the tile of a number.
+
+    Raises:
+        ValueError: none of the tiles has enough first targets.
     """
-    rng = streams.scenario()
-    drawn = int(rng.integers(len(tile_numbers)))
+    rng, waiting, left_out = streams.scenario(), list(tile_numbers), []
+    place = int(rng.integers(len(waiting)))
     if split == FRESH_SPLIT:  # each episode has ground of its own
-        drawn = streams.episode % len(tile_numbers)
-    tile = load(tile_numbers[drawn])
+        place = streams.episode % len(waiting)
+    tile = load(waiting.pop(place))
+    while not offers_targets(tile, preset.start):
+        left_out.append(tile.number)
+        if not waiting:
+            raise ValueError(
+                f"{preset.name}: no tile of split {split!r} has enough {describe_lack(preset.start)};"
+                " a smaller start.hazard_share allows safer ground"
+            )
+        tile = load(waiting.pop(int(rng.integers(len(waiting)))))
     plane = preset.terrain.maximum_elevation
     target = draw_target(tile, preset.start, plane, rng)
     target.flags.writeable = False
-    return Scenario(preset, split, streams, tile, draw_state(target, preset.start, rng), target)
+    state = draw_state(target, preset.start, rng)
+    return Scenario(preset, split, streams, tile, state, target, tuple(left_out))
 
 
 def sample_scenario(
@@ -176,7 +172,7 @@ def sample_scenario(
         The scenario. Its tile is built on first use and cached.
 
     Raises:
-        ValueError: unknown preset or split, or a negative seed or episode.
+        ValueError: unknown preset or split, a negative seed or episode, or no tile has enough first targets.
     """
     setting = find_preset(preset)
     ground = Ground(setting.terrain, setting.criteria)

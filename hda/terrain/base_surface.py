@@ -46,7 +46,9 @@ class BaseSurface:
 
 
 @lru_cache(maxsize=4)
-def _spectrum(surface: BaseSurface, size: int, pixel_size: float) -> FieldSpectrum:
+def _spectrum(
+    surface: BaseSurface, size: int, pixel_size: float, longest_wave: float | None
+) -> FieldSpectrum:
     # A period of two tiles keeps opposite edges unlike and leaves waves longer than the tile in it.
     period = fast_period(2 * size)
     frequency = frequency_grid(period)
@@ -59,21 +61,35 @@ def _spectrum(surface: BaseSurface, size: int, pixel_size: float) -> FieldSpectr
     phase = 2.0 * np.pi * np.fft.rfftfreq(period) * step / pixel_size
     difference = math.sqrt(float(np.sum(spectrum.variance_per_column() * 2.0 * (1.0 - np.cos(phase)))))
     wanted = math.tan(surface.rms_slope) * SLOPE_BASELINE * (step / SLOPE_BASELINE) ** surface.hurst
-    return spectrum.scaled(wanted / difference)
+    spectrum = spectrum.scaled(wanted / difference)
+    if longest_wave is not None:
+        spectrum.amplitude[frequency * longest_wave < pixel_size] = 0.0
+    return spectrum
 
 
 def generate_base_surface(
-    surface: BaseSurface, size: int, pixel_size: float, rng: np.random.Generator
+    surface: BaseSurface,
+    size: int,
+    pixel_size: float,
+    rng: np.random.Generator,
+    longest_wave: float | None = None,
 ) -> NDArray[np.float32]:
     """Draw heights [m] of a square of `size` cells of `pixel_size` [m], by spectral synthesis.
 
     The power spectral density falls as frequency^-(2 hurst + 2). The RMS slope holds over the ensemble; a
     single tile scatters about it.
 
+    Args:
+        surface: of which heights are drawn.
+        size: [cells] side of the square.
+        pixel_size: [m] side of a cell.
+        rng: source of the modes.
+        longest_wave: [m] only the part of the surface in waves up to this length; all of it if left out.
+
     Returns:
         (size, size) float32, [m], row north, column east.
     """
-    return synthesise_field(_spectrum(surface, size, pixel_size), size, rng)
+    return synthesise_field(_spectrum(surface, size, pixel_size, longest_wave), size, rng)
 
 
 def rms_slope(dem: NDArray[np.floating], pixel_size: float = 1.0, cells: int = 1) -> float:

@@ -1,4 +1,7 @@
-"""The named settings of the generator. Their numbers come from `python -m studies.calibrate`."""
+"""The named settings of the generator, and of the rocks that are added to a user's ground.
+
+The numbers of the generator come from `python -m studies.calibrate`.
+"""
 
 from __future__ import annotations
 
@@ -19,3 +22,18 @@ BOULDERS = RockPopulation(
 
 
 PAPER_TERRAIN = TerrainParameters(rocks=BLOCKY_ROCKS, islands=IslandField(20.0, threshold=-0.8))
+
+
+def _lunar_rocks(area_fraction: float) -> RockPopulation:
+    return RockPopulation(area_fraction, 0.5648, 0.01285, minimum_diameter=0.3, maximum_diameter=2.0)
+
+
+ROCK_ABUNDANCES = {
+    "sparse": _lunar_rocks(0.01),
+    "medium": _lunar_rocks(0.03),
+    "dense": _lunar_rocks(0.06),
+}
+"""Rocks of 0.3 to 2 m that an elevation model of coarse posts cannot show, by the share k of the ground that
+rocks of all sizes cover. The law is that of nasa-jpl/lunasynth (commit 8618e3d), which calls its
+q = 0.5648 + 0.01285 / k lunar; the shares span the range from which it draws k, 0.01 to 0.06. Its own named
+scenes have more: 0.03 for sparse ground, 0.20 for dense."""

@@ -23,7 +23,7 @@ from rl.environment.encoding import CURVED, LATENT_BOUND, LAYOUTS, Layout, encod
 from rl.environment.episode_info import describe_episode
 from rl.environment.episode_source import EpisodeSource
 from rl.inference.arrays import Array32
-from rl.inference.latent import LATENT_SIZE, load_encoder
+from rl.inference.latent import ENCODER, LATENT_SIZE, encoder_path, load_encoder
 
 ObsType = TypeVar("ObsType")
 _DISPERSION_NAMES = tuple(entry.name for entry in fields(Dispersions))
@@ -223,16 +223,29 @@ class LunarHDAEnv(LandingEnv[Array32]):
     prints them: position, velocity, mass, width twice, target. Rewards, actions and options: `LandingEnv`.
     """
 
+    def __init__(self, *arguments: Any, encoder: str = ENCODER, **options: Any) -> None:
+        """Make the environment.
+
+        Args:
+            arguments: as of `LandingEnv`.
+            encoder: shipped encoder of the looks, by name.
+            options: as of `LandingEnv`.
+
+        Raises:
+            ValueError: there is no such encoder; else as `LandingEnv`.
+        """
+        self.encoder = load_encoder(encoder_path(encoder))
+        super().__init__(*arguments, **options)
+
     def make_observation_space(self, preset: Preset) -> spaces.Space[Array32]:
-        """A box; the shipped encoder is loaded."""
-        load_encoder()
+        """A box."""
         bound = np.full(LATENT_SIZE, LATENT_BOUND, np.float32)
         low, high = np.concatenate([self.layout.low, -bound]), np.concatenate([self.layout.high, bound])
         return spaces.Box(low, high, dtype=np.float32)
 
     def encode(self, observation: Observation, nominal_target: Array) -> Array32:
         """The 44 numbers."""
-        latent = load_encoder().encode(observation.safety_map)
+        latent = self.encoder.encode(observation.safety_map)
         return encode_observation(self.layout, observation, nominal_target, latent)
 
 

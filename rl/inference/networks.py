@@ -1,7 +1,7 @@
 """Inference of small networks without torch: compiled loops, the same bits on any number of threads.
 
 Training uses torch; what is shipped is a list of arrays and these loops. Inner loops run over outputs, so
-they vectorise without reordering any sum. Zeros that a rectifier left are skipped.
+they vectorise without reordering any sum.
 """
 
 from __future__ import annotations
@@ -14,45 +14,63 @@ import numpy as np
 from guidance.kernel import compile_kernel
 from rl.inference.arrays import Array32
 from rl.inference.artefacts import ArtefactError, Tensors
+from rl.inference.lanes import LANES, load_lanes, spread_element, store_positive
 
 
 @compile_kernel
-def _gather_patches(image: Array32) -> Array32:
-    """4 x 4 patches at stride 2 and padding 1: image (in, rows, columns) -> (in * 16, rows/2 * columns/2)."""
-    channels, rows, columns = image.shape
-    half = columns // 2
-    patches = np.zeros((channels * 16, rows // 2 * half), dtype=np.float32)
-    for c in range(channels):
-        for p in range(4):
-            for q in range(4):
-                row = patches[c * 16 + p * 4 + q]
-                for i in range(rows // 2):
-                    y = 2 * i + p - 1
-                    if y < 0 or y >= rows:
-                        continue
-                    for j in range((1 if q == 0 else 0), (half - 1 if q == 3 else half)):
-                        row[i * half + j] = image[c, y, 2 * j + q - 1]
-    return patches
+def _convolve_into(image: Array32, weight: Array32, bias: Array32, out: Array32, border: int) -> None:
+    """4 x 4 kernel, stride 2, rectified: four neighbouring outputs of one row and 16 channels at a time.
 
-
-@compile_kernel
-def _convolve(image: Array32, weight: Array32, bias: Array32) -> Array32:
-    """4 x 4 kernel, stride 2, padding 1, rectified; image (in, rows, columns), weight (out, in * 16)."""
-    patches = _gather_patches(image)
-    size = patches.shape[1]
-    out = np.empty((weight.shape[0], size), dtype=np.float32)
-    for k in range(weight.shape[0]):
-        total = out[k]
-        total[:] = bias[k]
-        for t in range(0, weight.shape[1], 4):
-            # four terms at a time, so that the sums are stored a quarter as often
-            first, second, third, fourth = patches[t], patches[t + 1], patches[t + 2], patches[t + 3]
-            a, b, c, d = weight[k, t], weight[k, t + 1], weight[k, t + 2], weight[k, t + 3]
-            for m in range(size):
-                total[m] += (a * first[m] + b * second[m]) + (c * third[m] + d * fourth[m])
-        for m in range(size):
-            total[m] = max(total[m], np.float32(0.0))
-    return out.reshape((weight.shape[0], image.shape[1] // 2, image.shape[2] // 2))
+    Args:
+        image: shape (rows + 2, columns + 2, in), with a border of zeros; at least 8 columns.
+        weight: shape (out / 16, in * 16 * 16): for each 16 outputs, for each input and tap, in this order.
+        bias: shape (out,).
+        out: shape (rows / 2 + 2 border, columns / 2 + 2 border, out); its border is left as it is.
+        border: around what is written.
+    """
+    columns, inputs = image.shape[1], image.shape[2]
+    outputs, line = out.shape[2], columns * inputs
+    read, written = image.reshape(-1), out.reshape(-1)
+    half_rows, half_columns = (image.shape[0] - 2) // 2, (columns - 2) // 2
+    for block in range(weight.shape[0]):
+        taps = weight[block]
+        for i in range(half_rows):
+            for start in range(0, half_columns, 4):
+                j = min(start, half_columns - 4)
+                first = second = third = fourth = load_lanes(bias, block * LANES)
+                tap = 0
+                for channel in range(inputs):
+                    place = 2 * i * line + 2 * j * inputs + channel
+                    for _ in range(4):
+                        a, b = load_lanes(taps, tap), load_lanes(taps, tap + LANES)
+                        c, d = load_lanes(taps, tap + 2 * LANES), load_lanes(taps, tap + 3 * LANES)
+                        e, f = spread_element(read, place), spread_element(read, place + inputs)
+                        g, h = (
+                            spread_element(read, place + 2 * inputs),
+                            spread_element(read, place + 3 * inputs),
+                        )
+                        first = first + ((a * e + b * f) + (c * g + d * h))
+                        e, f = (
+                            spread_element(read, place + 4 * inputs),
+                            spread_element(read, place + 5 * inputs),
+                        )
+                        second = second + ((a * g + b * h) + (c * e + d * f))
+                        g, h = (
+                            spread_element(read, place + 6 * inputs),
+                            spread_element(read, place + 7 * inputs),
+                        )
+                        third = third + ((a * e + b * f) + (c * g + d * h))
+                        e, f = (
+                            spread_element(read, place + 8 * inputs),
+                            spread_element(read, place + 9 * inputs),
+                        )
+                        fourth = fourth + ((a * g + b * h) + (c * e + d * f))
+                        tap, place = tap + 4 * LANES, place + line
+                to = ((i + border) * out.shape[1] + j + border) * outputs + block * LANES
+                store_positive(first, written, to)
+                store_positive(second, written, to + outputs)
+                store_positive(third, written, to + 2 * outputs)
+                store_positive(fourth, written, to + 3 * outputs)
 
 
 @compile_kernel
@@ -81,7 +99,7 @@ class MapEncoder:
     """Safety map -> latent: convolutions, then one dense layer.
 
     Attributes:
-        convolutions: (weight (out, in * 16), bias (out,)) of each convolution.
+        convolutions: (weight, bias) of each convolution, as `_convolve_into` takes them.
         dense: (weight (in, latent), bias (latent,)); its inputs run over rows, columns, channels.
     """
 
@@ -99,18 +117,36 @@ class MapEncoder:
         convolutions = []
         for k in range(count):
             stored = _array(tensors, f"convolution.{k}.weight", 4)  # (4, 4, in, out)
-            rows = stored.transpose(3, 2, 0, 1).reshape(stored.shape[3], -1)
-            convolutions.append((np.ascontiguousarray(rows), _array(tensors, f"convolution.{k}.bias", 1)))
+            if stored.shape[3] % LANES:
+                raise ArtefactError(
+                    f"convolution {k} must have a multiple of {LANES} outputs, got {stored.shape[3]}"
+                )
+            blocks = stored.reshape(4, 4, stored.shape[2], -1, LANES).transpose(3, 2, 0, 1, 4)
+            weight = np.ascontiguousarray(blocks).reshape(len(blocks), -1)
+            convolutions.append((weight, _array(tensors, f"convolution.{k}.bias", 1)))
         return cls(
             tuple(convolutions), (_array(tensors, "latent.weight", 2), _array(tensors, "latent.bias", 1))
         )
 
     def encode(self, safety_map: Array32) -> Array32:
-        """Latent of one map, shape (latent,); the map has shape (64, 64)."""
-        image = np.ascontiguousarray(safety_map, dtype=np.float32)[None]
-        for weight, bias in self.convolutions:
-            image = _convolve(image, weight, bias)
-        return _connect(image.transpose(1, 2, 0).reshape(-1), *self.dense, False)
+        """Latent of one map, shape (latent,); the map has shape (64, 64).
+
+        Raises:
+            ValueError: the map has sides that the convolutions cannot halve.
+        """
+        last = len(self.convolutions) - 1
+        side = 8 << last
+        if safety_map.ndim != 2 or 0 in safety_map.shape or any(n % side for n in safety_map.shape):
+            raise ValueError(f"safety_map must have sides in multiples of {side}, got {safety_map.shape}")
+        rows, columns = safety_map.shape
+        image = np.zeros((rows + 2, columns + 2, 1), dtype=np.float32)
+        image[1:-1, 1:-1, 0] = safety_map
+        for k, (weight, bias) in enumerate(self.convolutions):
+            rows, columns, border = rows // 2, columns // 2, int(k < last)
+            out = np.zeros((rows + 2 * border, columns + 2 * border, bias.size), dtype=np.float32)
+            _convolve_into(image, weight, bias, out, border)
+            image = out
+        return _connect(image.reshape(-1), *self.dense, False)
 
 
 @dataclass(frozen=True, eq=False)

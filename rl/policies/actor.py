@@ -17,7 +17,7 @@ from rl.environment.action import PAPER_ACTIONS, ActionRanges, decide_action
 from rl.environment.encoding import ENCODING_VERSION, LAYOUTS, Layout, encode_observation
 from rl.inference.arrays import Array32
 from rl.inference.artefacts import WEIGHTS_FOLDER, Artefact, ArtefactError, load_artefact, require
-from rl.inference.latent import LATENT_SIZE, load_autoencoder, load_encoder
+from rl.inference.latent import LATENT_SIZE, encoder_of_card, load_encoder
 from rl.inference.networks import MapEncoder, Perceptron
 
 
@@ -52,10 +52,9 @@ def read_actor_card(card: dict[str, Any], path: Path) -> tuple[Layout, list[int]
     """Layout, sizes of the hidden layers and action ranges of an actor's card.
 
     Raises:
-        ArtefactError: it was made for another encoding or autoencoder, or a field is wrong.
+        ArtefactError: it was made for another encoding, or a field is wrong.
     """
     require(card, "encoding_version", ENCODING_VERSION, path)
-    require(card, "autoencoder", load_autoencoder().digest, path)
     if not isinstance(card.get("layout"), str) or card["layout"] not in LAYOUTS:
         raise ArtefactError(f"{path}: unknown layout {card.get('layout')!r}")
     try:
@@ -73,8 +72,9 @@ def actor_from_artefact(artefact: Artefact, path: Path) -> Actor:
         ArtefactError: they were made for another encoding, another autoencoder, or have other shapes.
     """
     layout, hidden, ranges = read_actor_card(artefact.card, path)
+    encoder = load_encoder(encoder_of_card(artefact.card, path))
     sizes = (len(layout.elements) + LATENT_SIZE, *hidden, 5)
-    return Actor(layout, load_encoder(), Perceptron.from_tensors(artefact.tensors, sizes), ranges)
+    return Actor(layout, encoder, Perceptron.from_tensors(artefact.tensors, sizes), ranges)
 
 
 def action_ranges_from_card(card: dict[str, object]) -> ActionRanges:

@@ -16,7 +16,7 @@ from rl.environment.action import PAPER_ACTIONS, ActionRanges, decide_action
 from rl.environment.encoding import Layout, encode_observation
 from rl.inference.arrays import Array32
 from rl.inference.artefacts import Artefact, ArtefactError, load_artefact
-from rl.inference.latent import LATENT_SIZE, load_encoder
+from rl.inference.latent import LATENT_SIZE, encoder_of_card, load_encoder
 from rl.inference.networks import MapEncoder
 from rl.inference.recurrent_network import RecurrentNetwork
 from rl.policies.actor import read_actor_card
@@ -96,12 +96,13 @@ def memory_actor_from_artefact(artefact: Artefact, path: Path) -> MemoryActor:
         ArtefactError: they were made for another encoding, another autoencoder, or have other shapes.
     """
     layout, hidden, ranges = read_actor_card(artefact.card, path)
+    encoder = load_encoder(encoder_of_card(artefact.card, path))
     memory = artefact.card.get("memory")
     if not isinstance(memory, int):
         raise ArtefactError(f"{path}: the card's 'memory' must be a whole number, got {memory!r}")
     size, reward = len(layout.elements) + LATENT_SIZE, artefact.card.get("algorithm") == "td3-lstm-plus"
     network = RecurrentNetwork.from_tensors(artefact.tensors, size, memory, hidden, reward)
-    return MemoryActor(layout, load_encoder(), network, ranges)
+    return MemoryActor(layout, encoder, network, ranges)
 
 
 @cache

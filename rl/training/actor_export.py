@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from rl.environment.encoding import ENCODING_VERSION, LAYOUTS
 from rl.inference.artefacts import Tensors
-from rl.inference.latent import LATENT_SIZE, load_autoencoder, load_encoder
+from rl.inference.latent import LATENT_SIZE, encoder_path, load_autoencoder, load_encoder
 from rl.inference.networks import Perceptron
 from rl.inference.recurrent_network import RecurrentNetwork
 from rl.policies.actor import Actor, ActorPolicy
@@ -59,7 +59,7 @@ def actor_card(settings: AgentSettings) -> dict[str, Any]:
         "layout": settings.layout,
         "hidden": list(settings.hidden),
         "encoding_version": ENCODING_VERSION,
-        "autoencoder": load_autoencoder().digest,
+        "autoencoder": load_autoencoder(encoder_path(settings.encoder)).digest,
         "action_ranges": asdict(settings.action_ranges),
     }
 
@@ -68,15 +68,13 @@ def policy_of(
     tensors: Tensors, settings: AgentSettings, name: str = "training"
 ) -> ActorPolicy | RecurrentActorPolicy:
     """The policy that these weights would be when shipped."""
-    layout = LAYOUTS[settings.layout]
+    layout, encoder = LAYOUTS[settings.layout], load_encoder(encoder_path(settings.encoder))
     if isinstance(settings, RecurrentSettings):
         reward = settings.algorithm == "td3-lstm-plus"
         network = RecurrentNetwork.from_tensors(
             tensors, len(layout.elements) + LATENT_SIZE, settings.memory, settings.hidden, reward
         )
-        return RecurrentActorPolicy(
-            name, MemoryActor(layout, load_encoder(), network, settings.action_ranges)
-        )
+        return RecurrentActorPolicy(name, MemoryActor(layout, encoder, network, settings.action_ranges))
     sizes = (len(layout.elements) + LATENT_SIZE, *settings.hidden, 5)
     network = Perceptron.from_tensors(tensors, sizes)
-    return ActorPolicy(name, Actor(layout, load_encoder(), network, settings.action_ranges))
+    return ActorPolicy(name, Actor(layout, encoder, network, settings.action_ranges))

@@ -47,7 +47,9 @@ def _train(folder: Path, preset: Preset, settings: AgentSettings, plan: Training
     from rl.training.recorder import Recorder
 
     checkpoint = _open_folder(folder, preset, settings, plan, resume)
-    env = LunarHDAEnv(preset, layout=settings.layout, action_ranges=settings.action_ranges)
+    env = LunarHDAEnv(
+        preset, layout=settings.layout, action_ranges=settings.action_ranges, encoder=settings.encoder
+    )
     algorithm = make_algorithm(settings, env, plan.seed)
     algorithm.set_logger(Logger(str(folder), [TensorBoardOutputFormat(str(folder / "tensorboard"))]))
     columns = (

@@ -85,6 +85,8 @@ class Chunk:
         rows: policy -> its rows, episodes ascending.
         decision_time: policy -> wall time of every decision [s], shape (decisions,).
         attempts: how often it was begun; above 1 where a worker died.
+        left_out: numbers of the tiles that its episodes passed over, ascending: too little hazard for a first
+            target.
     """
 
     first: int
@@ -92,6 +94,7 @@ class Chunk:
     rows: dict[str, list[EpisodeRow]]
     decision_time: dict[str, NDArray[np.float64]]
     attempts: int = 1
+    left_out: tuple[int, ...] = ()
 
 
 def chunk_bounds(study: Study) -> list[tuple[int, int]]:
@@ -115,8 +118,10 @@ def fly_chunk(study: Study, first: int, last: int) -> Chunk:
     pilots = {name: study.make_policy(name) for name in study.policies}
     rows: dict[str, list[EpisodeRow]] = {name: [] for name in pilots}
     times: dict[str, list[NDArray[np.float64]]] = {name: [] for name in pilots}
+    left_out: set[int] = set()
     for episode in range(first, last):
         scenario = sample_scenario(study.preset, study.study_seed, episode, study.split)
+        left_out.update(scenario.left_out)
         for name, pilot in pilots.items():
             try:
                 record = fly(pilot, scenario)
@@ -128,7 +133,8 @@ def fly_chunk(study: Study, first: int, last: int) -> Chunk:
                 ) from error
             rows[name].append(summarize_episode(record))
             times[name].append(record.decision_time)
-    return Chunk(first, last, rows, {name: np.concatenate(parts) for name, parts in times.items()})
+    seconds = {name: np.concatenate(parts) for name, parts in times.items()}
+    return Chunk(first, last, rows, seconds, left_out=tuple(sorted(left_out)))
 
 
 def fly_chunks(

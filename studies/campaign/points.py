@@ -12,6 +12,8 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from hda.flight.episode_row import EpisodeRow
+from hda.ground.undeclared_voids import name_tiles
+from hda.task.first_target import describe_lack
 from studies.campaign.claimed_folder import Existing
 from studies.campaign.episode_files import write_episodes
 from studies.campaign.executor import OpenExecutor, local_processes
@@ -75,6 +77,21 @@ def describe_retry(chunk: Chunk) -> str:
     return f"a worker died: episodes {chunk.first} to {chunk.last - 1} were flown again"
 
 
+def describe_left_out(chunk: Chunk, study: Study, named: set[int]) -> str:
+    """That tiles are not flown over, in words; empty where all of them were named before.
+
+    Args:
+        chunk: of the study.
+        study: with its start conditions.
+        named: tiles that were named; those of this chunk are added.
+    """
+    fresh = sorted({*chunk.left_out} - named)
+    named.update(fresh)
+    if not fresh:
+        return ""
+    return f"not flown over: {name_tiles(fresh)}, without enough {describe_lack(study.preset.start)}"
+
+
 def fly_points(out: Path, points: Sequence[Point], existing: Existing, workers: int) -> dict[str, Rows]:
     """Fly every point that is not finished yet; terrain is built for those alone.
 
@@ -113,11 +130,15 @@ def fly_points(out: Path, points: Sequence[Point], existing: Existing, workers: 
                 each = len(point.study.policies)
                 lacking = sum(last - first for first, last in missing[number])
                 progress.advance(task, (point.study.episodes - lacking) * each)
+                named: set[int] = set()
 
-                def count(chunk: Chunk, each: int = each) -> None:
+                def count(
+                    chunk: Chunk, each: int = each, study: Study = point.study, named: set[int] = named
+                ) -> None:
                     progress.advance(task, (chunk.last - chunk.first) * each)
-                    if words := describe_retry(chunk):
-                        progress.console.print(words)
+                    for words in (describe_retry(chunk), describe_left_out(chunk, study, named)):
+                        if words:
+                            progress.console.print(words)
 
                 fly_missing(folder, missing[number], processes, workers, count)
         return {point.label: _finish_point(folder) for point, folder in zip(points, folders, strict=True)}

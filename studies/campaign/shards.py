@@ -69,6 +69,7 @@ def write_shard(folder: Path, chunk: Chunk, session: str) -> Path:
         "first": chunk.first,
         "last": chunk.last,
         "attempts": chunk.attempts,
+        "left_out": chunk.left_out,
         "session": session,
         "columns": ROW_COLUMNS,
         "sha256": hashlib.sha256(body).hexdigest(),
@@ -130,6 +131,9 @@ def _parse_chunk(header: dict[str, Any], lines: list[dict[str, Any]]) -> Chunk:
     first, last, attempts = header["first"], header["last"], header["attempts"]
     if not all(type(value) is int for value in (first, last, attempts)) or not 0 <= first < last:
         raise ShardError("a shard is damaged: its header has no valid episode numbers")
+    left_out = header.get("left_out", [])  # an older shard has none
+    if not all(type(number) is int for number in left_out):
+        raise ShardError("a shard is damaged: its header has no valid numbers of tiles")
     rows: dict[str, list[EpisodeRow]] = {}
     seconds: dict[str, np.ndarray] = {}
     for line in lines:
@@ -138,7 +142,7 @@ def _parse_chunk(header: dict[str, Any], lines: list[dict[str, Any]]) -> Chunk:
         seconds[policy] = np.array(line["decision_time"], dtype=np.float64)
         if [row.episode for row in rows[policy]] != list(range(first, last)):
             raise ShardError(f"a shard is damaged: policy {policy!r} lacks episodes of {first} to {last - 1}")
-    return Chunk(first, last, rows, seconds, attempts)
+    return Chunk(first, last, rows, seconds, attempts, tuple(left_out))
 
 
 def _parse_row(values: list[Any]) -> EpisodeRow:

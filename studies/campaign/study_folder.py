@@ -96,17 +96,20 @@ class StudyFolder:
         write_shard(self.shards, chunk, self.session)
 
     def describe_flight(self) -> dict[str, Any]:
-        """For the provenance, once the chunks were read: the runs of the program, and the retried chunks."""
+        """For the provenance, once the chunks were read: runs of the program, retries, tiles left out."""
         sessions: dict[str, int] = {}
+        left_out: set[int] = set()
         retries = []
         for first, last in chunk_bounds(self.study):
             chunk, session = read_shard(shard_path(self.shards, first, last), policies=(), checked=True)
             sessions[session] = sessions.get(session, 0) + last - first
+            left_out.update(chunk.left_out)
             if chunk.attempts > 1:
                 retries.append({"episodes": [first, last - 1], "attempts": chunk.attempts})
         return {
             "sessions": [{"session": name, "episodes": count} for name, count in sorted(sessions.items())],
             "retries_after_a_worker_died": retries,
+            "left_out_tiles": sorted(left_out),
         }
 
 

@@ -18,6 +18,7 @@ from rich.console import Console
 
 from guidance.console import tolerate_encoding
 from guidance.validation import finite_number
+from hda.ground.detail import GroundDetail
 from hda.ground.own_terrain import OWN_SPLIT
 from hda.registry import policy_entry
 from hda.task.own_ground import place_preset
@@ -66,6 +67,9 @@ class Comparison(KeepingOptions):
         nodata: numbers in your terrain's file that mean unknown ground, besides that which it declares.
         flat_is_ground: areas of one exact height on your terrain are ground, not a value for unknown
             ground.
+        detail: seed of the hazards that are added to your terrain, whose pixels of more than 1 m cannot show
+            them: small craters, rocks, relief; nothing is added by default.
+        rock_abundance: of those rocks: sparse, medium or dense; medium by default.
         hazard_share: least share of unsafe ground around a first target on your terrain, 0 to 1; the preset's
             by default.
         workers: processes of this machine; changes nothing but the time.
@@ -90,6 +94,8 @@ class Comparison(KeepingOptions):
     band: int | None = None
     nodata: tuple[float, ...] = ()
     flat_is_ground: bool = False
+    detail: int | None = None
+    rock_abundance: str | None = None
     hazard_share: float | None = None
     workers: int = 2
     scheduler: str | None = None
@@ -142,18 +148,22 @@ def choose_ground(options: Comparison) -> tuple[Preset, str]:
         ValueError: the preset is unknown, or the terrain cannot be flown over.
     """
     if options.terrain is None:
-        for name in ("hazard_share", "band", "nodata", "flat_is_ground"):
+        for name in ("hazard_share", "band", "nodata", "flat_is_ground", "detail", "rock_abundance"):
             if getattr(options, name) != getattr(Comparison, name):
                 raise ValueError(f"{name} is for a terrain of your own: give --terrain too")
         return find_preset(options.preset), options.split
     if options.split not in (Comparison.split, OWN_SPLIT):
         raise ValueError(f"split must be {OWN_SPLIT!r} with a terrain of your own, got {options.split!r}")
+    if options.detail is None and options.rock_abundance is not None:
+        raise ValueError("rock_abundance is for rocks that are added: give --detail SEED too")
+    abundance = {} if options.rock_abundance is None else {"rock_abundance": options.rock_abundance}
     preset = place_preset(
         options.preset,
         options.terrain,
         band=options.band,
         nodata=options.nodata,
         flat_is_ground=options.flat_is_ground,
+        detail=None if options.detail is None else GroundDetail(options.detail, **abundance),
         hazard_share=options.hazard_share,
         workers=options.workers,
     )

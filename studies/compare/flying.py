@@ -19,7 +19,7 @@ from guidance.kernel import kernel_folder
 from hda.registry import policy_entry
 from studies.campaign.executor import OpenExecutor
 from studies.campaign.monte_carlo import Chunk, Study, fly_chunk, prepare_study
-from studies.campaign.points import describe_retry, find_missing, fly_missing
+from studies.campaign.points import describe_left_out, describe_retry, find_missing, fly_missing
 from studies.campaign.score import MEASURE_COLUMNS, RATIO_COLUMNS, RunningScore
 from studies.campaign.study_folder import StudyFolder
 from studies.columns import document_cell
@@ -68,6 +68,7 @@ def fly_comparison(folder: StudyFolder, open_executor: OpenExecutor, here: bool,
     ) as display:
         wilson_interval(0, 1)  # loads scipy.stats, 1 s: not later, while workers wait for their next chunks
         scores = {name: RunningScore() for name in study.policies}
+        named: set[int] = set()
 
         def tell(chunk: Chunk) -> None:
             for name, rows in chunk.rows.items():
@@ -76,8 +77,9 @@ def fly_comparison(folder: StudyFolder, open_executor: OpenExecutor, here: bool,
             display.advance(
                 chunk.last - chunk.first, partial(_table_so_far, scores), partial(_ratios_so_far, scores)
             )
-            if words := describe_retry(chunk):
-                display.print(words)
+            for words in (describe_retry(chunk), describe_left_out(chunk, study, named)):
+                if words:
+                    display.print(words)
 
         fly_missing(folder, missing, open_executor, workers, tell)
 

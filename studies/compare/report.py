@@ -12,6 +12,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from hda.ground.own_terrain import OwnTerrain
 from studies.campaign.monte_carlo import Study
 from studies.campaign.score import MEASURE_COLUMNS
 from studies.columns import Column, Output, Row, standing_in
@@ -107,6 +108,7 @@ def write_report(path: Path, content: ReportContent, flights: Sequence[FlightPic
         flights=list(flights),
         grounds={str(episode): picture_ground(study, episode) for episode in episodes},
         opening=None if opening is None else asdict(opening),
+        left_out=find_left_out(content),
         provenance=content.provenance,
         provenance_text=json.dumps(content.provenance, indent=1, sort_keys=True, default=str),
         css=source("report.css"),
@@ -114,6 +116,13 @@ def write_report(path: Path, content: ReportContent, flights: Sequence[FlightPic
         plotly=Markup(get_plotlyjs().replace("</script", "<\\/script")),
     )
     path.write_text(page, encoding="utf-8")
+
+
+def find_left_out(content: ReportContent) -> list[int]:
+    """Numbers of the tiles over which no episode begins, for want of hazard around a first target."""
+    terrain = content.study.preset.terrain
+    known = terrain.too_safe if isinstance(terrain, OwnTerrain) else ()
+    return sorted({*known, *content.provenance["flight"].get("left_out_tiles", ())})
 
 
 def script_json(value: Any) -> str:

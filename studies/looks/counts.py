@@ -13,9 +13,9 @@ from hda.ground.library import Ground, load_tile
 from hda.ground.tile import Tile
 from hda.sensing.measured_look import MeasuredGround, measure_ground
 from hda.sensing.ranging import RangingLidar, scan
+from hda.task.first_target import draw_target
 from hda.task.presets import Preset
 from hda.task.random_streams import EpisodeStreams
-from hda.task.scenario import draw_target
 
 _DESCENT_TIME = 30.0  # [s] range over speed: the ends of a flight of a minute at a constant deceleration
 

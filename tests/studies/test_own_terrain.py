@@ -10,7 +10,11 @@ import pytest
 import tyro
 
 from examples.own_terrain import write_site
-from studies.compare.command import Comparison, compare, plan_study
+from studies.campaign.command_line import choose_policies
+from studies.compare.command import Comparison, compare, plan_study, read_options
+
+# rasterio 1.4 multiplies affine 3 transforms the old way, inside itself.
+pytestmark = pytest.mark.filterwarnings("ignore:Use `@` matmul:PendingDeprecationWarning")
 
 
 @pytest.fixture(scope="module")
@@ -53,6 +57,11 @@ def test_a_study_over_own_ground(site: Path, tmp_path: Path) -> None:
         ({"terrain": None, "nodata": (0.0,)}, "nodata is for a terrain of your own"),
         ({"terrain": None, "band": 1}, "band is for a terrain of your own"),
         ({"terrain": None, "flat_is_ground": True}, "flat_is_ground is for a terrain of your own"),
+        ({"terrain": None, "detail": 1}, "detail is for a terrain of your own"),
+        ({"rock_abundance": "dense"}, "rocks that are added: give --detail SEED too"),
+        ({"detail": 1}, "pixels of 1 m show their own hazards"),
+        ({"detail": 1, "rock_abundance": "dens"}, "rock abundance.*dense"),
+        ({"detail": -1}, "whole number of at least 0"),
         ({"band": 2}, "band is for GeoTIFF files"),
         ({"terrain": None, "split": "own"}, "needs a terrain of your own"),
         ({"terrain": Path("none.tif")}, "no such file"),
@@ -99,6 +108,29 @@ def test_a_tile_without_hazard_does_not_stop_the_study(
     assert terrain["nodata"] == [-9999.0]
     with (tmp_path / "study" / "episodes.csv").open(newline="") as stream:
         assert {row["tile"] for row in csv.DictReader(stream)} == {"1"}
+
+
+@pytest.mark.slow
+def test_posts_of_5_m_go_to_a_table_of_all_policies(tmp_path: Path) -> None:
+    """One command, from an orbiter's GeoTIFF to every policy that flies by default."""
+    write_site(tmp_path / "site.tif")
+    terrain, out = tmp_path / "site.tif", tmp_path / "study"
+    ground = ["--terrain", str(terrain), "--detail", "3", "--rock-abundance", "medium", "--preset", "lidar"]
+    study = ["--episodes", "2", "--workers", "1", "--no-figures", "--out", str(out)]
+    compare(read_options([*ground, *study]))
+    with (out / "table.csv").open(newline="") as stream:
+        assert {row["policy"] for row in csv.DictReader(stream)} >= set(
+            choose_policies(("default",), "lidar")[0]
+        )
+    with (out / "episodes.csv").open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    assert len(rows) == 2 * len({row["policy"] for row in rows})
+    provenance = json.loads((out / "provenance.json").read_text())
+    assert provenance["preset"]["name"] == "lidar-site-medium"
+    added = provenance["preset"]["terrain"]["added"]
+    assert (added["seed"], added["rock_abundance"]) == (3, "medium")
+    assert provenance["preset"]["terrain"]["source_pixel"] == 5.0
+    assert (out / "report.html").stat().st_size > 1000
 
 
 @pytest.mark.parametrize(

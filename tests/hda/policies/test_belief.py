@@ -49,10 +49,13 @@ def test_fusion_is_bayes_rule_cell_by_cell(seed, noise):
     sensor = Sensor(lidar.noise, lidar.noise_range, lidar.off_nadir_limit)
     slow = [Look(o.state.position, o.target, o.width, o.safety_map) for o in looks]
     posterior = belief.probability()
+    counts = np.zeros((24, 24), dtype=int)
+    counts[belief.readings.place] = belief.readings.count
+    np.testing.assert_array_equal(belief.seen, counts > 0)
     for row in range(24):
         for column in range(24):
             readings = readings_of_cell((row, column), slow, sensor)
-            assert belief.looks[row, column] == len(readings)
+            assert counts[row, column] == len(readings)
             expected = probability_safe(readings, LEVELS, LEVEL_SHARES)
             assert posterior[row, column] == pytest.approx(expected, abs=2e-5)
 
@@ -62,11 +65,13 @@ def test_the_order_of_looks_does_not_matter_and_the_old_belief_is_left_alone():
     blank = SafetyBelief.blank(np.array([12.0, 12.0]), 12)
     forward = backward = blank
     for k in range(3):
+        before, said = forward, forward.probability()
         forward = forward.fused(looks[k], lidar)
         backward = backward.fused(looks[2 - k], lidar)
+        np.testing.assert_array_equal(before.probability(), said)
     np.testing.assert_allclose(forward.probability(), backward.probability(), atol=1e-5)
-    assert not blank.looks.any()
-    assert not blank.log_likelihood.any()
+    assert not blank.seen.any()
+    assert blank.readings.log_likelihood.size == 0
 
 
 def test_a_posterior_is_right_as_often_as_it_says():
@@ -80,8 +85,9 @@ def test_a_posterior_is_right_as_often_as_it_says():
         target = np.array([30.0, 30.0, PLANE])
         observation = observe(lidar, target + np.array([0.0, 0.0, 200.0]), target, probability, rng)
         belief = SafetyBelief.blank(target, 30).fused(observation, lidar)
-        weight = np.exp(belief.log_likelihood - belief.log_likelihood.max(axis=0))
-        believed.append((weight[4:].sum(axis=0) / weight.sum(axis=0))[belief.seen])
+        likelihood = belief.readings.log_likelihood[belief.readings.count > 0]
+        weight = np.exp(likelihood - likelihood.max(axis=1, keepdims=True))
+        believed.append(weight[:, 4:].sum(axis=1) / weight.sum(axis=1))
         truth.append((probability > 0.5)[belief.seen])
     p, safe = np.concatenate(believed), np.concatenate(truth)
     for low in np.arange(0.0, 1.0, 0.2):

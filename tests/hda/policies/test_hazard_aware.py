@@ -1,5 +1,6 @@
 """The hazard-aware objective: what it must prefer, against slow sums, and what it does in flight."""
 
+import itertools
 import math
 import subprocess
 import sys
@@ -16,10 +17,10 @@ from guidance.two_impulse import divert_cost
 from hda.flight.episode import begin_flight, fly, observe
 from hda.policies.belief import SafetyBelief
 from hda.policies.hazard_aware import HazardAwareMemory, HazardAwareSite
+from hda.policies.landing_dispersion import landing_probability
 from hda.policies.site_price import (
     HazardAwareWeights,
     NextLook,
-    landing_probability,
     predict_next_look,
     price_sites,
 )
@@ -93,12 +94,14 @@ def test_the_price_is_the_sum_that_the_docstring_states(seed, height, useful):
 
 
 def test_a_dispersed_landing_on_even_ground_is_as_safe_as_the_ground():
-    even = landing_probability(np.full((20, 20), 0.7, dtype=np.float32), 0.5)
-    np.testing.assert_allclose(even[2:-2, 2:-2], 0.7, rtol=1e-6)
-    assert not even[:2].any()
-    edge = landing_probability(ground((slice(0, 60), slice(0, SIDE), 1.0)), 0.5)
-    assert edge[50, 60] == pytest.approx(1.0)
-    inside, outside = edge[59, 60], edge[60, 60]
+    even = np.full((20, 20), 0.7, dtype=np.float32)
+    for cell in itertools.product((2, 9, 17), (2, 9, 17)):
+        assert landing_probability(even, 0.5, cell) == pytest.approx(0.7, rel=1e-6)
+    for cell in ((0, 9), (1, 9), (18, 9), (19, 9), (9, 0), (9, 1), (9, 18), (9, 19)):
+        assert landing_probability(even, 0.5, cell) == 0.0
+    edge = ground((slice(0, 60), slice(0, SIDE), 1.0))
+    assert landing_probability(edge, 0.5, (50, 60)) == pytest.approx(1.0)
+    inside, outside = (landing_probability(edge, 0.5, (row, 60)) for row in (59, 60))
     assert inside + outside == pytest.approx(1.0, abs=1e-6)
     assert 0.8 < inside < 0.9  # half a metre inside at 0.5 m: Phi(1) = 0.84
 

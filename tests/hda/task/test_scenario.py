@@ -12,10 +12,11 @@ from scipy.stats import kstest
 import hda
 from hda.ground.library import SPLITS
 from hda.ground.tile import Tile
+from hda.task.first_target import draw_target
 from hda.task.presets import PRESETS, Preset
 from hda.task.random_streams import EpisodeStreams
 from hda.task.rules import Range, Rules, StartConditions
-from hda.task.scenario import draw_scenario, draw_state, draw_target
+from hda.task.scenario import draw_scenario, draw_state
 from hda.terrain.generator import TerrainParameters
 from tests.equality import same
 

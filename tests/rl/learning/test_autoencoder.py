@@ -1,11 +1,21 @@
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import torch
 
 from hda.task.presets import PRESETS
-from rl.inference.latent import LATENT_SIZE, load_autoencoder, load_encoder
+from rl.inference.artefacts import ArtefactError
+from rl.inference.latent import (
+    LATENT_SIZE,
+    encoder_names,
+    encoder_of_card,
+    encoder_path,
+    load_autoencoder,
+    load_encoder,
+)
 from rl.inference.networks import MapEncoder
 from rl.learning.autoencoder import (
     Autoencoder,
@@ -119,3 +129,14 @@ def test_training_lowers_the_loss_and_repeats(maps):
     losses = [[loss for _, loss, _ in train_autoencoder(maps, settings, seed=0)] for _ in range(2)]
     assert losses[0][-1] < losses[0][0]
     assert losses[0] == losses[1]
+
+
+def test_an_encoder_is_found_by_its_name_and_by_the_digest_on_a_card(tmp_path: Path) -> None:
+    assert encoder_names()[0] == "autoencoder"
+    for name in encoder_names():
+        path = encoder_path(name)
+        assert encoder_of_card({"autoencoder": load_autoencoder(path).digest}, tmp_path) == path
+    with pytest.raises(ValueError, match="unknown encoder 'auto'"):
+        encoder_path("auto")
+    with pytest.raises(ArtefactError, match="made for autoencoder 'none', but this program has"):
+        encoder_of_card({"autoencoder": "none"}, tmp_path)
