@@ -13,7 +13,7 @@ import os
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import Any, Literal, TypeVar, cast
 
 import numba
 import platformdirs
@@ -45,7 +45,9 @@ def kernel_folder() -> Path:
     return cache_folder() / "kernels" / source_hash()
 
 
-def compile_kernel(function: Function, *, parallel: bool = False, error_model: str = "python") -> Function:
+def compile_kernel(
+    function: Function, *, parallel: bool = False, error_model: Literal["python", "numpy"] = "python"
+) -> Function:
     """Compile a function on first call, without the GIL; cached on disk where that is possible.
 
     With numba's own switch `NUMBA_DISABLE_JIT=1` it stays Python, for a debugger or a count of covered lines.

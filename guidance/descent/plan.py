@@ -52,7 +52,7 @@ class Plan:
         trajectory: the flight on N nodes; empty where the status has none.
         landing_error: [m] distance from landing point to target; nan without a flight.
         message: the ending in words.
-        proof: the `certificate`, or what makes it when it is first asked for.
+        proof: the `certificate`, or what makes it of the plan when it is first asked for.
         solves: conic (or nonlinear) programmes solved on the way, coarse ones and refinements included;
             those of proofs are not.
     """
@@ -63,7 +63,7 @@ class Plan:
     trajectory: Trajectory = field(default_factory=no_trajectory)
     landing_error: float = float("nan")
     message: str = ""
-    proof: Certificate | Callable[[], Certificate] | None = None
+    proof: Certificate | Callable[[Plan], Certificate | None] | None = None
     solves: int = 0
 
     @classmethod
@@ -74,10 +74,11 @@ class Plan:
         method: str,
         trajectory: Trajectory,
         solves: int = 0,
+        proof: Callable[[Plan], Certificate | None] | None = None,
     ) -> Plan:
         """A plan with a flight."""
-        miss = math.dist(trajectory.position[-1, :2], problem.target[:2])
-        return cls(status, problem, method, trajectory, miss, message=status.value, solves=solves)
+        miss = math.dist(trajectory.position[-1, :2].tolist(), problem.target[:2].tolist())
+        return cls(status, problem, method, trajectory, miss, status.value, proof, solves)
 
     @property
     def time(self) -> Array:
@@ -126,7 +127,7 @@ class Plan:
         The latter is made in about a millisecond on first use. None for plans to the nearest point and those
         of the closed loop.
         """
-        return self.proof() if callable(self.proof) else self.proof
+        return self.proof(self) if callable(self.proof) else self.proof
 
     @property
     def optimality_gap(self) -> float:

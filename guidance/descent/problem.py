@@ -62,16 +62,18 @@ class LandingProblem:
 
     def __post_init__(self) -> None:
         """Refuse what no solver should see."""
+        state = [*self.state.position.tolist(), *self.state.velocity.tolist(), self.state.mass]
+        numbers = {"state": state}
         for name in _VECTORS:
             vector = finite_vector(name, getattr(self, name), 3)
             vector.flags.writeable = False
             object.__setattr__(self, name, vector)
+            numbers[name] = vector.tolist()
         if not isinstance(self.lander, Lander):
             raise ValueError(f"lander must be a Lander, got {self.lander!r}")
         if not isinstance(self.limits, Limits):
             raise ValueError(f"limits must be a Limits, got {self.limits!r}")
-        state = [*self.state.position.tolist(), *self.state.velocity.tolist(), self.state.mass]
-        for name, values in (("state", state), *((name, getattr(self, name).tolist()) for name in _VECTORS)):
+        for name, values in numbers.items():
             if max(map(abs, values)) > LARGEST_NUMBER:
                 raise ValueError(f"{name}: no number may exceed {LARGEST_NUMBER:g}, got {values}")
         if self.state.mass <= self.lander.dry_mass:
@@ -110,7 +112,7 @@ class LandingProblem:
         if offset[2] < 0.0:
             offset[2] = 0.0
         outside = self.outside_glide_slope(offset)
-        rounding = ROUNDING * max(1.0, math.hypot(*offset))
+        rounding = ROUNDING * max(1.0, math.hypot(*offset.tolist()))
         if 0.0 < outside <= rounding:
             across, angle = math.hypot(offset[0], offset[1]), self.glide_slope_limit or 0.0
             offset[:2] *= 1.0 - outside * math.cos(angle) / across
@@ -147,7 +149,7 @@ class LandingProblem:
     @property
     def arrived(self) -> bool:
         """Whether the start is the target, with its velocity, to rounding: no flight is needed."""
-        near = math.hypot(*self.offset) <= ROUNDING
+        near = math.hypot(*self.offset.tolist()) <= ROUNDING
         return near and math.dist(self.state.velocity, self.target_velocity) <= self.speed_rounding
 
     @property

@@ -14,7 +14,7 @@ import numpy as np
 
 from guidance.arrays import Array
 from guidance.constants import MOON_GRAVITY
-from guidance.descent.flown_path import BETWEEN, distance_between, fly_thrust, length_of
+from guidance.descent.flown_path import BETWEEN, distance_between, fly_states, length_of
 from guidance.descent.limits import Cone
 from guidance.descent.problem import LandingProblem
 from guidance.descent.trajectory import Trajectory
@@ -127,23 +127,23 @@ class Residuals:
             problem: what the plan was asked.
         """
         lander, tolerance = problem.lander, FLIGHT_TOLERANCE
-        unit = max(1.0, math.hypot(*problem.gravity) / -MOON_GRAVITY[2])
-        allowed = {
-            "position": tolerance.position * unit,
-            "velocity": tolerance.velocity * unit,
-            "thrust_above": tolerance.thrust * lander.max_thrust,
-            "thrust_below": max(tolerance.thrust * lander.min_thrust, 1e-9),
-            "thrust_dip": max(tolerance.thrust_dip * lander.min_thrust, 1e-9),
-            "thrust_rate": tolerance.thrust_rate * (problem.limits.thrust_rate or math.inf),
-            "pointing": tolerance.pointing,
-            "final_thrust_direction": tolerance.pointing,
-            "glide_slope": tolerance.position * unit,
-            "line_of_sight": tolerance.position * unit,
-            "altitude": tolerance.altitude * unit,
-            "speed": tolerance.velocity * unit,
-            "propellant": tolerance.propellant,
+        unit = max(1.0, math.hypot(*problem.gravity.tolist()) / -MOON_GRAVITY[2])
+        rate = tolerance.thrust_rate * (problem.limits.thrust_rate or math.inf)
+        return {
+            "position": self.position / (tolerance.position * unit),
+            "velocity": self.velocity / (tolerance.velocity * unit),
+            "thrust_above": self.thrust_above / (tolerance.thrust * lander.max_thrust),
+            "thrust_below": self.thrust_below / max(tolerance.thrust * lander.min_thrust, 1e-9),
+            "thrust_dip": self.thrust_dip / max(tolerance.thrust_dip * lander.min_thrust, 1e-9),
+            "thrust_rate": self.thrust_rate / rate,
+            "pointing": self.pointing / tolerance.pointing,
+            "final_thrust_direction": self.final_thrust_direction / tolerance.pointing,
+            "glide_slope": self.glide_slope / (tolerance.position * unit),
+            "line_of_sight": self.line_of_sight / (tolerance.position * unit),
+            "altitude": self.altitude / (tolerance.altitude * unit),
+            "speed": self.speed / (tolerance.velocity * unit),
+            "propellant": self.propellant / tolerance.propellant,
         }
-        return {name: getattr(self, name) / bound for name, bound in allowed.items()}
 
     def keeps_limits(self, problem: LandingProblem) -> bool:
         """Whether the flown plan lands where it says and keeps every limit of `problem`, to the tolerance."""
@@ -172,7 +172,7 @@ def _measure(
     """Compare flown states with the plan.
 
     Args:
-        fine: what `fly_thrust` gives.
+        fine: flown states, as of `fly_states`.
         thrust: [N] shape (N - 1, 2 * BETWEEN + 1, 3).
         trajectory: time, position, velocity and mass at the nodes.
         exhaust_velocity: [m/s].
@@ -201,6 +201,19 @@ def _measure(
             flow = (mass[k] - mass[k + 1]) / (time[k + 1] - time[k]) * exhaust_velocity
             gap = max(gap, flow - 0.5 * (before + after))
     return _Departures(far, fast, heavy, last, greatest, least, between, lowest, speed, gap)
+
+
+@compile_kernel
+def _fly_and_measure(
+    start: tuple[Array, Array, float],
+    thrust: Array,
+    trajectory: tuple[Array, Array, Array, Array],
+    field: tuple[Array, Array],
+    exhaust_velocity: float,
+) -> tuple[Array, _Departures]:
+    """Flown states, and what they depart from; arguments as of `fly_states` and `_measure`."""
+    fine = fly_states(start, trajectory[0], thrust, field, exhaust_velocity)
+    return fine, _measure(fine, thrust, trajectory, exhaust_velocity)
 
 
 def pointing_excess(thrust: Array, limit: float | None, max_thrust: float) -> float:
@@ -265,18 +278,19 @@ def fly_residuals(trajectory: Trajectory, problem: LandingProblem) -> Residuals:
         problem: its limits.
     """
     thrust = trajectory.sample_thrust(2 * BETWEEN)
-    fine = fly_thrust(trajectory, thrust, problem)
-    lander, end, flown = problem.lander, fine[-1], fine[::BETWEEN, :3]
+    lander, state, field = problem.lander, problem.state, (problem.gravity, problem.angular_velocity)
     nodes = trajectory.time, trajectory.position, trajectory.velocity, trajectory.mass
-    found = _measure(fine, thrust, nodes, trajectory.exhaust_velocity)
-    floor = min(float(problem.target[2]), float(fine[0, 2]))
+    start = state.position, state.velocity, state.mass
+    fine, found = _fly_and_measure(start, thrust, nodes, field, trajectory.exhaust_velocity)
+    end, flown = fine[-1].tolist(), fine[::BETWEEN, :3]
+    floor = min(float(problem.target[2]), float(state.position[2]))
     limit = math.inf if problem.speed_limit is None else problem.speed_limit
     return Residuals(
         position=found.position,
         velocity=found.velocity,
         mass=found.mass,
         landing_position=found.landing_position,
-        landing_velocity=math.dist(end[3:6], problem.target_velocity),
+        landing_velocity=math.dist(end[3:6], problem.target_velocity.tolist()),
         thrust_above=max(0.0, found.greatest_thrust - lander.max_thrust),
         thrust_below=max(0.0, lander.min_thrust - found.least_thrust),
         thrust_dip=max(0.0, lander.min_thrust - found.least_between),
@@ -287,6 +301,6 @@ def fly_residuals(trajectory: Trajectory, problem: LandingProblem) -> Residuals:
         line_of_sight=_sight_excess(flown, problem.target, problem.limits.line_of_sight),
         altitude=max(0.0, floor - found.lowest),
         speed=max(0.0, found.speed - limit),
-        propellant=max(0.0, lander.dry_mass - float(end[6])),
+        propellant=max(0.0, lander.dry_mass - end[6]),
         relaxation_gap=found.relaxation_gap,
     )

@@ -98,6 +98,11 @@ def new_extremal() -> Extremal:
     return Extremal(np.empty((2, 3)), np.empty(3), no_touch())
 
 
+def blank_extremal() -> Extremal:
+    """The same, without the way into compiled code and back."""
+    return Extremal(np.empty((2, 3)), np.empty(3), np.array([-math.inf, 0.0, 0.0]))
+
+
 @compile_kernel
 def no_touch() -> Array:
     """Of the ground, as an extremal holds it."""

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from guidance.flight_time.extremal import LEGS, PrimerPath
+from guidance.flight_time.extremal import LEGS, Extremal, PrimerPath, PrimerProblem, fly_extremal
 from guidance.kernel import compile_kernel
 
 KEPT, POINTING, ALTITUDE, SPEED, GLIDE_SLOPE, FINAL_DIRECTION, LINE_OF_SIGHT, PROPELLANT = range(8)
-"""What a flight breaks; the last three are not for compiled code."""
+"""What a flight breaks; `broken_limit` knows the first five."""
 _BELOW = 1e-6  # of the largest coordinate: rounding, at the target's altitude
 
 
@@ -33,8 +33,8 @@ def path_limits(
     """Limits [rad, m/s, rad] as numbers; None for none."""
     return PathLimits(
         -math.inf if pointing is None else math.cos(pointing),
-        math.inf if speed is None else speed,
-        math.inf if glide_slope is None else glide_slope,
+        math.inf if speed is None else float(speed),
+        math.inf if glide_slope is None else float(glide_slope),
     )
 
 
@@ -73,3 +73,27 @@ def broken_limit(path: PrimerPath, limits: PathLimits, unit: float) -> int:
         if math.hypot(x, y) * cosine > z * sine:
             return GLIDE_SLOPE
     return KEPT
+
+
+@compile_kernel
+def burnt_share(x: Extremal, mass_flow: float) -> float:
+    """Share of the start mass that a flight burns."""
+    return mass_flow * (max(x.times[0], 0.0) + x.times[2] - x.times[1])
+
+
+@compile_kernel
+def judge_extremal(
+    x: Extremal, problem: PrimerProblem, limits: PathLimits, unit: float, log_mass_ratio: float
+) -> int:
+    """The first limit that an extremal breaks: PROPELLANT, or one of `broken_limit`; else KEPT.
+
+    Args:
+        x: in seconds.
+        problem: its problem, in seconds.
+        limits: in SI.
+        unit: [m/s^2] full thrust over start mass.
+        log_mass_ratio: ln(start mass / dry mass).
+    """
+    if -math.log1p(-burnt_share(x, problem.mass_flow)) > log_mass_ratio:
+        return PROPELLANT
+    return broken_limit(fly_extremal(x, problem), limits, unit)

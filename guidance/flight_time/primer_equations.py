@@ -56,19 +56,20 @@ def residuals(x: Extremal, problem: PrimerProblem, out: Array) -> None:
     t1, t2, final = x.times[0], x.times[1], x.times[2]
     r, v, g, flow = problem
     first = max(t1, 0.0)
-    here = np.zeros(6)
+    for number in range(6):
+        out[number] = 0.0
     if first > 0.0:
-        add_burn(x, Burn(0.0, first, 1.0), flow, final, here)
+        add_burn(x, Burn(0.0, first, 1.0), flow, final, out)
     hamiltonian = 0.0
     for axis in range(3):
         q1, q2 = x.primer[0, axis], x.primer[1, axis]
-        speed = v[axis] + g[axis] * t2 + here[3 + axis]
+        speed = v[axis] + g[axis] * t2 + out[3 + axis]
         hamiltonian += q2 * g[axis] * (t2 - t1) - (q2 - q1) * speed
-    add_burn(x, Burn(t2, final, 1.0 - flow * first), flow, final, here)
+    add_burn(x, Burn(t2, final, 1.0 - flow * first), flow, final, out)
     for axis in range(3):
         fall = g[axis] * final
-        out[axis] = r[axis] + (v[axis] + 0.5 * fall) * final + here[axis]
-        out[3 + axis] = v[axis] + fall + here[3 + axis]
+        out[axis] += r[axis] + (v[axis] + 0.5 * fall) * final
+        out[3 + axis] += v[axis] + fall
     out[6] = hamiltonian
     if out.size == TOUCHING:
         touch, up = x.touch[0], np.zeros(6)
@@ -87,8 +88,9 @@ def move_extremal(x: Extremal, frame: Array, step: Array, out: Extremal) -> None
             value += frame[2 * k, axis] * step[2 * k] + frame[2 * k + 1, axis] * step[2 * k + 1]
             out.primer[k, axis] = value
             size += value * value
+        size = math.sqrt(size)
         for axis in range(3):
-            out.primer[k, axis] /= math.sqrt(size)
+            out.primer[k, axis] /= size
     for k in range(3):
         out.times[k] = x.times[k] + step[ANGLES + k]
     if step.size == TOUCHING:

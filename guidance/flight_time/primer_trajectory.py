@@ -18,7 +18,7 @@ from guidance.flight_time.extremal import (
     set_direction,
     touches,
 )
-from guidance.flight_time.primer_vector import PrimerFlight, scale_landing
+from guidance.flight_time.primer_vector import PrimerFlight
 from guidance.kernel import compile_kernel
 
 _SLIVER = 1e-9
@@ -45,7 +45,9 @@ class PrimerTrajectory(Trajectory):
     def states_at(self, time: Array, gravity: Array) -> tuple[Array, Array]:
         """Position [m] and velocity [m/s], shape (k, 3) each, exact; as `Trajectory.states_at`."""
         scale = self.max_thrust / float(self.mass[0])
-        problem = PrimerProblem(np.zeros(3), self.velocity[0] / scale, gravity / scale, self.flight.burn_rate)
+        problem = PrimerProblem(
+            np.zeros(3), self.velocity[0] / scale, gravity / scale, self.flight.scaled.mass_flow
+        )
         states = _states(self.flight.extremal, problem, np.array(time, dtype=np.float64))
         return self.position[0] + scale * states[:, :3], scale * states[:, 3:6]
 
@@ -56,7 +58,7 @@ class PrimerTrajectory(Trajectory):
     def sample_thrust(self, parts: int) -> Array:
         """[N] thrust within the intervals, shape (N - 1, parts + 1, 3); as `Trajectory.sample_thrust`."""
         out = np.empty((self.nodes - 1, parts + 1, 3))
-        _sample(self.flight.extremal, self.max_thrust, np.array(self.time), out)
+        _sample(self.flight.extremal, self.max_thrust, self.time, out)
         return out
 
     def _thrust_within(self, time: Array) -> Array:
@@ -73,10 +75,9 @@ def lay_nodes(problem: LandingProblem, flight: PrimerFlight, nodes: int) -> Prim
         nodes: N, shared among the arcs by their durations; two for each arc at least.
     """
     lander, state = problem.lander, problem.state
-    laid = _lay(flight.extremal, scale_landing(problem), nodes, lander.max_thrust, state.mass)
-    time, position, velocity, mass, thrust = laid
-    position += problem.target
-    position[0], velocity[0] = state.position, state.velocity
+    engine = float(lander.max_thrust), state.mass
+    ends = state.position, state.velocity, problem.target
+    time, position, velocity, mass, thrust = _lay(flight.extremal, flight.scaled, nodes, engine, ends)
     return PrimerTrajectory(
         time, position, velocity, mass, thrust, lander.exhaust_velocity, flight, lander.max_thrust
     )
@@ -193,15 +194,30 @@ def _states(x: Extremal, problem: PrimerProblem, times: Array) -> Array:
 
 @compile_kernel
 def _lay(
-    x: Extremal, problem: PrimerProblem, nodes: int, max_thrust: float, start_mass: float
+    x: Extremal,
+    problem: PrimerProblem,
+    nodes: int,
+    engine: tuple[float, float],
+    ends: tuple[Array, Array, Array],
 ) -> tuple[Array, Array, Array, Array, Array]:
-    """Time, position as seen from the target, velocity, mass and thrust at the nodes, in SI."""
+    """Time, position, velocity, mass and thrust at the nodes, in SI.
+
+    Args:
+        x: the extremal, in seconds.
+        problem: its problem, in seconds.
+        nodes: as of `lay_nodes`.
+        engine: full thrust [N], and mass at the start [kg].
+        ends: position [m] and velocity [m/s] at the start, to the last bit, and the target [m].
+    """
+    max_thrust, start_mass = engine
     time = _node_times(x, nodes)
     states, thrust = _states(x, problem, time), _thrust(x, max_thrust, time)
     position, velocity, mass = np.empty((time.size, 3)), np.empty((time.size, 3)), np.empty(time.size)
     scale = max_thrust / start_mass
     for k in range(time.size):
         for axis in range(3):
-            position[k, axis], velocity[k, axis] = scale * states[k, axis], scale * states[k, 3 + axis]
+            position[k, axis] = scale * states[k, axis] + ends[2][axis]
+            velocity[k, axis] = scale * states[k, 3 + axis]
         mass[k] = start_mass * states[k, 6]
+    position[0], velocity[0] = ends[0], ends[1]
     return time, position, velocity, mass, thrust

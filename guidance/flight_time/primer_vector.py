@@ -16,22 +16,29 @@ from guidance.descent.problem import LandingProblem
 from guidance.flight_time.extremal import (
     Extremal,
     PrimerProblem,
+    blank_extremal,
     fly_extremal,
-    new_extremal,
     set_direction,
 )
 from guidance.flight_time.fixed_time import solve_primer_at
+from guidance.flight_time.full_burn import solve_full_burn
 from guidance.flight_time.ground_contact import find_ground_contact
 from guidance.flight_time.path_limits import (
     ALTITUDE,
     FINAL_DIRECTION,
     KEPT,
     LINE_OF_SIGHT,
-    PROPELLANT,
-    broken_limit,
+    PathLimits,
+    burnt_share,
+    judge_extremal,
     path_limits,
 )
-from guidance.flight_time.primer_equations import solve_primer, solve_touching
+from guidance.flight_time.primer_equations import solve_from, solve_primer, solve_touching
+from guidance.kernel import compile_kernel
+
+_NOT_FOUND = -1
+_Vehicle = tuple[PathLimits, float, float]
+"""Limits, full thrust over start mass [m/s^2], and ln(start mass / dry mass)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,12 +47,12 @@ class PrimerFlight:
 
     Attributes:
         extremal: its arcs and its primer, in seconds, as the kernels read it.
-        burn_rate: [1/s] share of the start mass burnt per second at full thrust.
+        scaled: the problem that it solves, in seconds.
         broken: the first limit of the problem that it breaks, as of `path_limits`; KEPT for none.
     """
 
     extremal: Extremal
-    burn_rate: float
+    scaled: PrimerProblem
     broken: int = KEPT
 
     @cached_property
@@ -66,7 +73,7 @@ class PrimerFlight:
     def burnt_at(self, times: Array) -> Array:
         """Share of the start mass that is burnt at times [s] of the flight, shape (k,)."""
         burning = np.minimum(times, self.first_burn) + np.maximum(times - self.braking, 0.0)
-        return self.burn_rate * burning
+        return self.scaled.mass_flow * burning
 
     def log_mass(self, nodes: int) -> Array:
         """ln(m / m_start) at N equal steps, shape (N,)."""
@@ -75,7 +82,7 @@ class PrimerFlight:
     @property
     def log_mass_ratio(self) -> float:
         """ln(start mass / final mass)."""
-        return -math.log1p(-self.burn_rate * (self.first_burn + self.time - self.braking))
+        return -math.log1p(-burnt_share(self.extremal, self.scaled.mass_flow))
 
     def direction_at(self, time: float) -> Array:
         """Unit vector of the primer, along which the thrust points; shape (3,)."""
@@ -94,7 +101,8 @@ def scale_landing(problem: LandingProblem) -> PrimerProblem:
 def find_primer_flight(problem: LandingProblem, time: float | None = None) -> PrimerFlight | None:
     """Flight of least propellant by the indirect method.
 
-    Where it would cut through the target's altitude in its first burn, the one that touches it there.
+    Where it would cut through the target's altitude in its first burn, the one that touches it there; where a
+    coast would only cost, the one that burns all the way.
 
     Args:
         problem: the landing problem.
@@ -103,8 +111,8 @@ def find_primer_flight(problem: LandingProblem, time: float | None = None) -> Pr
     Returns:
         The flight; None where none was found, where the engine cannot stop or cannot lift the vehicle, where
         the flight does not end at rest, where the frame turns, where the thrust may not jump, where gravity
-        vanishes, where no coast is left between the burns, or where the flight breaks a limit of the
-        problem: the method knows none but a touch of the ground, and that for the best time alone.
+        vanishes, or where the flight breaks a limit of the problem: the method knows none but a touch of the
+        ground, and that, like a flight without a coast, for the best time alone.
     """
     flight = find_extremal_flight(problem, time)
     return None if flight is None or flight.broken else flight
@@ -117,31 +125,74 @@ def find_extremal_flight(problem: LandingProblem, time: float | None = None) -> 
         return None
     if problem.limits.thrust_rate is not None:
         return None
-    scaled, x = scale_landing(problem), new_extremal()
-    flight = None
-    if solve_primer(scaled, x) and (time is None or solve_primer_at(time, scaled, x)):
-        flight = PrimerFlight(x, scaled.mass_flow, _broken_limit(problem, scaled, x))
-        if flight.broken != ALTITUDE:
+    scaled, x, vehicle = scale_landing(problem), blank_extremal(), _vehicle(problem)
+    flight = _read(problem, scaled, x, _seek(scaled, vehicle, math.nan if time is None else time, x))
+    if flight is not None and flight.broken != ALTITUDE:
+        return flight
+    if time is not None or find_ground_contact(problem) is not None:
+        return flight
+    if flight is None:
+        x = blank_extremal()
+        flight = _read(problem, scaled, x, _seek_full_burn(scaled, vehicle, x))
+        if flight is not None and flight.broken != ALTITUDE:
             return flight
-    if time is None and find_ground_contact(problem) is None:
-        x = new_extremal()
-        if solve_touching(scaled, x):
-            return PrimerFlight(x, scaled.mass_flow, _broken_limit(problem, scaled, x))
-    return flight
+    x = blank_extremal()
+    return _read(problem, scaled, x, _seek_touching(scaled, vehicle, x)) or flight
 
 
-def _broken_limit(problem: LandingProblem, scaled: PrimerProblem, x: Extremal) -> int:
-    """The first limit that an extremal breaks, as of `path_limits`; KEPT, which is zero, if it keeps all."""
-    if PrimerFlight(x, scaled.mass_flow).log_mass_ratio > problem.log_mass_ratio:
-        return PROPELLANT
-    limits, unit = problem.limits, problem.lander.max_thrust / problem.state.mass
-    path = fly_extremal(x, scaled)
-    asked = path_limits(problem.lander.pointing_limit, limits.speed, limits.glide_slope)
-    broken = broken_limit(path, asked, unit)
-    if broken:
-        return broken
-    final, sight = limits.final_thrust_direction, limits.line_of_sight
-    if final is not None and final.excess(path.direction[-1]) > 0.0:
-        return FINAL_DIRECTION
-    outside = sight is not None and sight.outside(unit * path.position[:-1]).max() > 0.0
-    return LINE_OF_SIGHT if outside else KEPT
+def fly_to(problem: LandingProblem, x: Extremal, size: int) -> PrimerFlight | None:
+    """Flight along the extremal of a problem next to one that is known; None where there is none.
+
+    Args:
+        problem: the landing problem.
+        x: an extremal of a problem that is nearly the same, in seconds; changed in place.
+        size: FREE, or TOUCHING where it touches the ground.
+    """
+    scaled = scale_landing(problem)
+    return _read(problem, scaled, x, _seek_near(scaled, _vehicle(problem), size, x))
+
+
+def _vehicle(problem: LandingProblem) -> _Vehicle:
+    lander, limits = problem.lander, problem.limits
+    asked = path_limits(lander.pointing_limit, limits.speed, limits.glide_slope)
+    return asked, lander.max_thrust / problem.state.mass, problem.log_mass_ratio
+
+
+@compile_kernel
+def _seek(problem: PrimerProblem, vehicle: _Vehicle, time: float, x: Extremal) -> int:
+    """Find the extremal of a time of flight [s], nan for the best one; what it breaks, or _NOT_FOUND."""
+    if solve_primer(problem, x) and (math.isnan(time) or solve_primer_at(time, problem, x)):
+        return judge_extremal(x, problem, *vehicle)
+    return _NOT_FOUND
+
+
+@compile_kernel
+def _seek_full_burn(problem: PrimerProblem, vehicle: _Vehicle, x: Extremal) -> int:
+    """The same for the flight that burns all the way."""
+    return judge_extremal(x, problem, *vehicle) if solve_full_burn(problem, x) else _NOT_FOUND
+
+
+@compile_kernel
+def _seek_touching(problem: PrimerProblem, vehicle: _Vehicle, x: Extremal) -> int:
+    """The same for the extremal that touches the ground, of the best time."""
+    return judge_extremal(x, problem, *vehicle) if solve_touching(problem, x) else _NOT_FOUND
+
+
+@compile_kernel
+def _seek_near(problem: PrimerProblem, vehicle: _Vehicle, size: int, x: Extremal) -> int:
+    """The same for the extremal next to a given one, with FREE or TOUCHING equations."""
+    return judge_extremal(x, problem, *vehicle) if solve_from(x, problem, size) else _NOT_FOUND
+
+
+def _read(problem: LandingProblem, scaled: PrimerProblem, x: Extremal, broken: int) -> PrimerFlight | None:
+    """A flight that was sought, looked at for the limits that compiled code does not know."""
+    if broken == _NOT_FOUND:
+        return None
+    final, sight = problem.limits.final_thrust_direction, problem.limits.line_of_sight
+    if broken == KEPT and (final is not None or sight is not None):
+        path, unit = fly_extremal(x, scaled), problem.lander.max_thrust / problem.state.mass
+        if final is not None and final.excess(path.direction[-1]) > 0.0:
+            broken = FINAL_DIRECTION
+        elif sight is not None and sight.outside(unit * path.position[:-1]).max() > 0.0:
+            broken = LINE_OF_SIGHT
+    return PrimerFlight(x, scaled, broken)

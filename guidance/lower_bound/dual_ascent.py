@@ -220,7 +220,7 @@ def ascend(
     Args:
         start: primer, shape (6,) or (10,).
         basis: columns are the directions in which it may move, shape (6, 6) or (9, 7); the seventh number,
-            a multiplier, does not fall below zero.
+            the multiplier along a limit's normal, does not fall below zero.
         time: [s] of flight.
         case: the relaxed problem.
         tolerance: [m/s] stop where the next step promises less.
@@ -228,6 +228,9 @@ def ascend(
     """
     primer, trial, numbers = start.copy(), start.copy(), np.zeros(basis.shape[1])
     gradient, there = np.empty(basis.shape[0]), np.empty(basis.shape[0])
+    if numbers.size > AFFINE:
+        limit = basis[AFFINE:, AFFINE]
+        numbers[AFFINE] = dot(primer[AFFINE:THETA], limit) / dot(limit, limit)
     value = dual_value(primer, time, case, gradient)
     stalled = False
     damping, size = _LEAST_DAMPING, case.full * time

@@ -12,7 +12,8 @@ import math
 import numpy as np
 
 from guidance.arrays import Array, Index
-from guidance.flight_time.extremal import Extremal, PrimerProblem, new_extremal
+from guidance.flight_time.extremal import Extremal, PrimerProblem, new_extremal, touches
+from guidance.flight_time.linear_system import dot
 from guidance.flight_time.neighbouring_extremals import (
     Neighbours,
     find_neighbours,
@@ -22,7 +23,8 @@ from guidance.flight_time.neighbouring_extremals import (
 from guidance.kernel import compile_kernel
 from guidance.lower_bound.dual_ascent import two_impulse_primer
 from guidance.lower_bound.dual_case import DualCase
-from guidance.lower_bound.dual_function import linear_part
+from guidance.lower_bound.dual_function import THETA, linear_part
+from guidance.lower_bound.path_limit import widen_primer
 from guidance.lower_bound.time_cover import (
     CoverAim,
     TimeCover,
@@ -41,7 +43,8 @@ _BEFORE = 1.0 - 1e-9  # of the best time: a node of the grid lies at it, up to r
 _EARLIEST = 0.1  # of the best time
 _IMPULSES = 1.02  # times the level: where two impulses spend so much, their primer is enough
 _CELLS = 70  # of the grid of times, up to the best time
-_TOLERANCE = 2e-6  # of the exhaust velocity: 2.4 g of 1200 kg
+NEIGHBOUR_TOLERANCE = 2e-6
+"""Of the exhaust velocity, 2.4 g of 1200 kg: how far below what is aimed at a cover may lie."""
 MOST_PRIMERS = 24
 """Of a cover by neighbours, the constant ones included."""
 
@@ -71,6 +74,18 @@ def primer_of(x: Extremal, case: DualCase) -> Array:
     for number in range(6):
         primer[number] *= scale
     return primer
+
+
+@compile_kernel
+def kinked_primer_of(x: Extremal, case: DualCase) -> Array:
+    """The same with ten numbers: at a touch of the ground the altitude is the limit that it uses."""
+    primer = primer_of(x, case)
+    out = widen_primer(primer)
+    if touches(x):
+        slope = (x.primer[0] - x.primer[1]) / (x.times[1] - x.times[0])
+        scale = math.sqrt(dot(primer[3:], primer[3:]) / dot(slope, slope))
+        out[THETA - 1], out[THETA] = scale * x.touch[1], x.times[2] - x.touch[0]
+    return out
 
 
 @compile_kernel
@@ -167,6 +182,6 @@ def bound_by_neighbours(
     Returns:
         [s] The grid of times, and the cover of its cells.
     """
-    aim = CoverAim(target, _TOLERANCE * exhaust, -np.inf)
+    aim = CoverAim(target, NEIGHBOUR_TOLERANCE * exhaust, -np.inf)
     times = time_grid(case, target * (1.0 + 1e-12), x.times[2], _CELLS)
     return times, cover_by_neighbours(find_neighbours(x, problem), problem, times, case, aim)

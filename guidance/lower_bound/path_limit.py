@@ -80,6 +80,29 @@ def _kinked_basis(time: float, normal: Array) -> Array:
 
 
 @compile_kernel
+def shift_kink(known: Array, later: float, time: float) -> Array:
+    """A primer for a flight of `time` [s], `later` [s] more: its limit binds as long after the start."""
+    out = known.copy()
+    out[THETA] = min(max(known[THETA] + later, 0.0), time)
+    return out
+
+
+@compile_kernel
+def ascend_with_kink(start: Array, time: float, case: DualCase, tolerance: float, enough: float) -> Ascent:
+    """The best primer of a time of flight [s] with the limit on the path that `start` uses; as `ascend`."""
+    normal = start[AFFINE:THETA] / math.sqrt(dot(start[AFFINE:THETA], start[AFFINE:THETA]))
+    return ascend(start, _kinked_basis(time, normal), time, case, tolerance, enough)
+
+
+@compile_kernel
+def has_kink(primer: Array) -> bool:
+    """Whether a primer uses a limit on the path."""
+    if primer.size == AFFINE:
+        return False
+    return primer[AFFINE] != 0.0 or primer[AFFINE + 1] != 0.0 or primer[AFFINE + 2] != 0.0
+
+
+@compile_kernel
 def keep_path(found: Ascent, time: float, case: DualCase, tolerance: float, enough: float) -> Ascent:
     """Raise the bound of one time of flight by the limit on the path.
 

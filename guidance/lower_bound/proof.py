@@ -11,24 +11,25 @@ from guidance.arrays import Array
 from guidance.descent.certificate import Certificate
 from guidance.descent.dual_bound import DualBound, DualPiece
 from guidance.descent.problem import LandingProblem
+from guidance.flight_time.extremal import touches
 from guidance.flight_time.primer_vector import PrimerFlight
 from guidance.lower_bound.dual_ascent import two_impulse_primer
 from guidance.lower_bound.dual_case import dual_case
 from guidance.lower_bound.dual_function import AFFINE, THETA
-from guidance.lower_bound.neighbour_cover import primer_of
+from guidance.lower_bound.neighbour_cover import NEIGHBOUR_TOLERANCE, bound_by_neighbours, kinked_primer_of
 from guidance.lower_bound.time_cover import (
     GRANTED,
     CoverAim,
     TimeCover,
     best_primer,
+    bound_at,
     claimed_bound,
     cover_times,
-    sweep_cells,
 )
 from guidance.lower_bound.time_grid import time_grid
 
 _CELLS = 240  # of the grid of times, up to the time to begin with
-_HAIR = 1e-9  # of one time of flight: the cell whose bound is that of this time
+_DECISIVE = 1e-8  # of the exhaust velocity: tolerance of a bound that shall lie above the tank's content
 _SCOPE = "every time of flight, in continuous time"
 _CAUSES = ("maximum thrust", "propellant")
 GAP_TOLERANCE = 1e-6
@@ -104,11 +105,20 @@ def certify_cover(
 def _bound_above_tank(
     problem: LandingProblem, time: float, flight: PrimerFlight | None = None
 ) -> DualBound | None:
-    """A bound that no tank pays for; None where there is none."""
+    """A bound that no tank pays for, by neighbours of an extremal or by a search; None without one."""
     exhaust = problem.lander.exhaust_velocity
     most = exhaust * problem.log_mass_ratio
     target = most + 2.0 * GRANTED * exhaust
-    times, cover = _cover(problem, most, time, flight, CoverAim(target, GAP_TOLERANCE * exhaust, target))
+    if flight is not None and not touches(flight.extremal):
+        case = dual_case(problem, most)
+        level = target + NEIGHBOUR_TOLERANCE * exhaust  # so that no cell is left below the target
+        times, cover = bound_by_neighbours(flight.extremal, flight.scaled, case, level, exhaust)
+        if cover.level >= target:
+            return _bound_by_cover(problem, most, times, cover)
+    aim = CoverAim(target, _DECISIVE * exhaust, target)
+    times, cover = _cover(problem, most, time, flight, aim)
+    if cover.level < target <= cover.best_value and flight is not None:  # a kink may lead the search astray
+        times, cover = _cover(problem, most, time, None, aim)
     return _bound_by_cover(problem, most, times, cover) if cover.level >= target else None
 
 
@@ -127,7 +137,7 @@ def _cover(
 ) -> tuple[Array, TimeCover]:
     case = dual_case(problem, most)
     times = time_grid(case, aim.target * (1.0 + 1e-12), time, _CELLS)
-    start = two_impulse_primer(time, case) if flight is None else primer_of(flight.extremal, case)
+    start = two_impulse_primer(time, case) if flight is None else kinked_primer_of(flight.extremal, case)
     return times, cover_times(times, case, start, time, aim)
 
 
@@ -135,12 +145,10 @@ def _bound_at(problem: LandingProblem, most: float, time: float) -> DualBound:
     """What flights of one duration spend at least."""
     case = dual_case(problem, most)
     aim = CoverAim(most, GAP_TOLERANCE * problem.lander.exhaust_velocity, -math.inf)
-    found = best_primer(two_impulse_primer(time, case), time, case, aim)
-    times = np.append(np.linspace(0.0, time, _CELLS + 1)[:-1], [time * (1.0 - _HAIR), time])
-    lowest = np.empty(times.size - 1)
-    sweep_cells(found.primer, times, case, lowest)
+    found = best_primer(two_impulse_primer(time, case), 0.0, time, case, aim)
     pieces = (_piece(time, time, found.primer),)
-    return DualBound(problem, most, _claim(problem, lowest[-1], most), pieces, time, time)
+    level = bound_at(found.primer, time, case)
+    return DualBound(problem, most, _claim(problem, level, most), pieces, time, time)
 
 
 def _piece(begin: float, end: float, primer: Array) -> DualPiece:

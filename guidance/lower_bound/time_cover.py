@@ -17,11 +17,20 @@ from guidance.kernel import compile_kernel
 from guidance.lower_bound.dual_ascent import Ascent, affine_basis, ascend, dual_value, two_impulse_primer
 from guidance.lower_bound.dual_case import DualCase
 from guidance.lower_bound.dual_function import AFFINE, THETA, linear_part, sweep_bound
-from guidance.lower_bound.path_limit import PRIMER_SIZE, keep_path, widen_primer
+from guidance.lower_bound.path_limit import (
+    PRIMER_SIZE,
+    ascend_with_kink,
+    has_kink,
+    keep_path,
+    shift_kink,
+    widen_primer,
+)
 
 _FIRST_STRIDE = 5e-3  # of the time of flight
 _NUDGE = 0.03  # towards the primer of two impulses: one that is best at another time may lie on a kink of D
 _FIRST_SCALE = 1.1  # of the primer of two impulses: longer than one, its thrust burns somewhere
+_FINE = 240  # cells of the grid of one time of flight
+_HAIR = 1e-9  # of one time of flight: the cell whose bound is that of this time
 _STRETCH = 1.7  # of the distance from the best time
 _NEARER = 1.0 - 1e-9  # than another cell: what lies further inside is rounding
 MOST_PRIMERS = 160
@@ -97,12 +106,37 @@ def last_primer(case: DualCase, time: float) -> Array:
 
 
 @compile_kernel
-def best_primer(known: Array, time: float, case: DualCase, aim: CoverAim) -> Ascent:
+def bound_at(primer: Array, time: float, case: DualCase) -> float:
+    """[m/s] D of a primer at one time of flight [s], on a grid on which a thrust that turns fast is seen."""
+    marks, lowest = np.empty(_FINE + 2), np.empty(_FINE + 1)
+    for k in range(_FINE):
+        marks[k] = time * k / _FINE
+    marks[_FINE], marks[_FINE + 1] = time * (1.0 - _HAIR), time
+    sweep_cells(primer, marks, case, lowest)
+    return float(lowest[_FINE])
+
+
+@compile_kernel
+def _follow_kink(start: Array, time: float, case: DualCase, aim: CoverAim) -> Ascent:
+    """The best primer with the limit of `start`, or that itself, whichever the finer grid says."""
+    found = ascend_with_kink(start, time, case, 0.1 * aim.tolerance, 2.0 * aim.target)
+    before, after = bound_at(start, time, case), bound_at(found.primer, time, case)
+    return Ascent(start, before, False) if before > after else Ascent(found.primer, after, found.stalled)
+
+
+@compile_kernel
+def best_primer(known: Array, later: float, time: float, case: DualCase, aim: CoverAim) -> Ascent:
     """The best primer of a time, of ten numbers, from one that is known or from that of two impulses.
 
     Where no ascent gets that far it is that of two impulses, whose bound is their velocity change. Where its
-    bound is less than the aim's target, a limit on the path may raise it.
+    bound is less than the aim's target, a limit on the path may raise it. The time is `later` [s] than that
+    of the known one: a limit that it uses is tried first.
     """
+    kinked = Ascent(widen_primer(known), -np.inf, True)
+    if has_kink(known):
+        kinked = _follow_kink(shift_kink(known, later, time), time, case, aim)
+        if kinked.value > aim.target - aim.tolerance:
+            return kinked
     gradient, basis = np.empty(6), affine_basis(time)
     impulses = two_impulse_primer(time, case)
     second = _FIRST_SCALE * impulses
@@ -119,7 +153,8 @@ def best_primer(known: Array, time: float, case: DualCase, aim: CoverAim) -> Asc
         found = Ascent(impulses, least, True)
     if found.value > aim.target - aim.tolerance:
         return Ascent(widen_primer(found.primer), found.value, found.stalled)
-    return keep_path(found, time, case, 0.1 * aim.tolerance, 2.0 * aim.target)
+    kept = keep_path(found, time, case, 0.1 * aim.tolerance, 2.0 * aim.target)
+    return kinked if kinked.value > kept.value else kept
 
 
 @compile_kernel
@@ -206,6 +241,7 @@ def cover_times(times: Array, case: DualCase, start: Array, near: float, aim: Co
     """
     cells = times.size - 1
     primers, owner = np.empty((MOST_PRIMERS, PRIMER_SIZE)), np.zeros(cells, np.int64)
+    made_for = np.full(MOST_PRIMERS, near)
     envelope = np.full(cells, -np.inf)
     primers[0] = widen_primer(last_primer(case, times[-1]))
     primers[1] = widen_primer(along_change(case))
@@ -213,14 +249,14 @@ def cover_times(times: Array, case: DualCase, start: Array, near: float, aim: Co
         join_cover(primers[count], count, times, case, envelope, owner)
     level, best_time, best_value = aim.target, near, np.inf
     time, count, cell, again, stride = near, 2, -1, False, 0.0
-    known = widen_primer(start)
+    known, known_time = widen_primer(start), near
     while count < MOST_PRIMERS:
-        found = best_primer(known, time, case, aim)
+        found = best_primer(known, time - known_time, time, case, aim)
         better = found.value < best_value - aim.tolerance
         if found.value < best_value:
             best_value, best_time = found.value, time
             level = min(aim.target, best_value - aim.tolerance)
-        primers[count] = found.primer
+        primers[count], made_for[count] = found.primer, time
         join_cover(found.primer, count, times, case, envelope, owner)
         count += 1
         if best_value < aim.floor:
@@ -228,7 +264,7 @@ def cover_times(times: Array, case: DualCase, start: Array, near: float, aim: Co
         if better:
             stride = _next_stride(found, time, stride, case, aim.tolerance)
             if stride != 0.0 and times[1] < time + stride < times[-1]:
-                time, known = time + stride, found.primer
+                time, known, known_time = time + stride, found.primer, time
                 continue
         if again:  # the best primer of this cell is among them: more cannot be had of it
             level = min(level, envelope[cell])
@@ -237,6 +273,6 @@ def cover_times(times: Array, case: DualCase, start: Array, near: float, aim: Co
             break
         again = cell == cell_before
         time = _beyond(0.5 * (times[cell] + times[cell + 1]), best_time, again, times)
-        known = primers[owner[cell]]
+        known, known_time = primers[owner[cell]], float(made_for[owner[cell]])
     lowest_bound = min(float(np.min(envelope)), linear_part(primers[0], times[-1], case))
     return TimeCover(primers[:count].copy(), owner, lowest_bound, best_time, best_value)

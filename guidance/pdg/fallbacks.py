@@ -22,9 +22,10 @@ import numpy as np
 from guidance.descent.certificate import Certificate
 from guidance.descent.plan import Plan, PlanStatus
 from guidance.descent.problem import LandingProblem
-from guidance.descent.trajectory import Trajectory
-from guidance.flight_time.primer_vector import PrimerFlight, find_extremal_flight, find_primer_flight
+from guidance.flight_time.primer_vector import PrimerFlight, find_extremal_flight
+from guidance.flight_time.time_window import time_window
 from guidance.pdg.unrelaxed import plan_unrelaxed
+from guidance.planning.indirect_planner import plan_indirect, plan_nearest_indirect
 from guidance.state import State
 
 if TYPE_CHECKING:
@@ -115,18 +116,23 @@ def answer(request: Request, unreachable: str) -> Plan:
 
 def _bounded(plan: Plan, request: Request) -> Plan:
     """The plan with a way to prove what no flight undercuts; of its duration, where that was asked for."""
-    if plan.status is not PlanStatus.OPTIMAL or plan.propellant <= 0.0 or plan.problem.rotates:
+    if plan.status is not PlanStatus.OPTIMAL or plan.proof is not None or plan.problem.rotates:
         return plan
+    return replace(plan, proof=_prover(request))
+
+
+def _prover(request: Request) -> Callable[[Plan], Certificate | None]:
+    """What proves that no flight undercuts a plan that answers a request."""
     this_time_alone = request.time_of_flight is not None
-    return replace(plan, proof=partial(_prove_bound, plan.problem, plan.trajectory, this_time_alone))
+    return partial(_prove_bound, None if this_time_alone else request.flight, this_time_alone)
 
 
-def _prove_bound(problem: LandingProblem, trajectory: Trajectory, this_time_alone: bool) -> Certificate:
+def _prove_bound(flight: PrimerFlight | None, this_time_alone: bool, plan: Plan) -> Certificate | None:
     from guidance.lower_bound.proof import prove_least_propellant
 
-    propellant = float(trajectory.mass[0] - trajectory.mass[-1])
-    flight = None if this_time_alone else find_primer_flight(problem)
-    return prove_least_propellant(problem, propellant, trajectory.duration, flight, this_time_alone)
+    if not plan.propellant > 0.0:
+        return None
+    return prove_least_propellant(plan.problem, plan.propellant, plan.time_of_flight, flight, this_time_alone)
 
 
 def _plan_again(request: Request, nodes: int, found: Plan) -> Plan:
@@ -144,19 +150,15 @@ def _plan_again(request: Request, nodes: int, found: Plan) -> Plan:
 def plan_by_method(request: Request) -> Plan:
     """Plan by the chosen method; a plan without a flight still lacks its proof."""
     if request.method in ("auto", "indirect"):
-        from guidance.planning.indirect_planner import plan_indirect
-
-        plan = plan_indirect(request.problem, request.nodes, request.flight)
+        proof = None if request.provisional else _prover(request)
+        plan = plan_indirect(request.problem, request.nodes, request.flight, proof)
         kept = plan.status.has_flight and (request.provisional or plan.keeps_limits)
         if kept or request.method == "indirect":  # a limit may break between the places that it looks at
             return plan
     if request.bounds_first and request.flight is None:
-        from guidance.planning.infeasibility import prove_by_dual_bound
-
-        proof = prove_by_dual_bound(request.problem, request.extremal)
-        if proof is not None:
-            none = Plan(PlanStatus.INFEASIBLE, request.problem, "dual bound", message=_OUT_OF_REACH)
-            return replace(none, proof=proof)
+        none = _refuse(request)
+        if none is not None:
+            return none
     if request.method in ("auto", "convex"):
         return _plan_convex(request)
     if request.method == "cvxpy":
@@ -164,6 +166,22 @@ def plan_by_method(request: Request) -> Plan:
 
         return plan_cvxpy(request.problem, request.nodes, request.time_of_flight)
     return _plan_casadi(request)
+
+
+def _refuse(request: Request) -> Plan | None:
+    """Proof, without a solver, that no flight exists; None where these bounds show none."""
+    from guidance.planning.infeasibility import prove_by_dual_bound, prove_by_window
+
+    problem, window = request.problem, time_window(request.problem)
+    if window.empty:
+        proof, method, words = prove_by_window(window), "closed form", window.cause
+    else:
+        proof, method, words = (
+            prove_by_dual_bound(problem, request.extremal, window),
+            "dual bound",
+            _OUT_OF_REACH,
+        )
+    return None if proof is None else Plan(PlanStatus.INFEASIBLE, problem, method, message=words, proof=proof)
 
 
 def _plan_convex(request: Request) -> Plan:
@@ -240,12 +258,9 @@ def within_limits(plan: Plan, plan_again: Callable[[int, Plan], Plan]) -> Plan:
 
 def answer_without_flight(plan: Plan, request: Request, unreachable: str) -> Plan:
     """Fly to the nearest reachable point, where asked to, or tell infeasible from failed by a certificate."""
-    from guidance.planning.convex_planner import plan_nearest
-
-    problem, nodes, time_of_flight = request.problem, request.nodes, request.time_of_flight
-    anywhere = request.landing_error_weight is not None
+    time_of_flight, anywhere = request.time_of_flight, request.landing_error_weight is not None
     if unreachable == "nearest" and not anywhere:
-        nearest = plan_nearest(problem, nodes, time_of_flight, request.provisional)
+        nearest = _plan_nearest(request)
         nearest = replace(nearest, solves=plan.solves + nearest.solves)
         if nearest.status.has_flight:
             return nearest
@@ -265,6 +280,18 @@ def answer_without_flight(plan: Plan, request: Request, unreachable: str) -> Pla
         message = f"{plan.message}; infeasibility could not be proved"
         return replace(plan, status=PlanStatus.LIMIT_REACHED, message=message)
     return plan
+
+
+def _plan_nearest(request: Request) -> Plan:
+    """The reachable point nearest to the target: by the indirect method, else by the convex problem."""
+    from guidance.planning.convex_planner import plan_nearest
+
+    problem, nodes = request.problem, request.nodes
+    if request.method == "auto" and request.time_of_flight is None:
+        plan = plan_nearest_indirect(problem, nodes, request.extremal)
+        if plan.status.has_flight and (request.provisional or plan.keeps_limits):
+            return plan
+    return plan_nearest(problem, nodes, request.time_of_flight, request.provisional)
 
 
 def _prove_infeasible(request: Request, anywhere: bool) -> Certificate | ConvexSolution | None:

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Literal, get_args
+from typing import Literal, cast, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from guidance.arrays import Array
 from guidance.constants import MOON_GRAVITY
 from guidance.descent.limits import NO_LIMITS, Limits
 from guidance.descent.plan import InfeasibleError, Plan, PlanStatus, SolverFailedError
@@ -19,7 +20,7 @@ from guidance.descent.problem import LandingProblem
 from guidance.lander import PAPER_LANDER, Lander
 from guidance.pdg.fallbacks import Request, answer
 from guidance.state import State
-from guidance.validation import finite_number, finite_vector
+from guidance.validation import finite_number
 
 DEFAULT_NODES = 61
 """Nodes of a plan unless asked otherwise: they cost about 5 g of propellant on the paper's descents."""
@@ -72,7 +73,7 @@ def solve_pdg(
             'cvxpy' (the same problem, for reading) or 'casadi' (the unrelaxed nonconvex problem by fatrop or
             IPOPT).
         unreachable: what to do where the target is out of reach: 'raise', or plan to the softly reachable
-            point 'nearest' to it in its plane (always by the convex method).
+            point 'nearest' to it in its plane (by 'auto' from the indirect method, else the convex one).
         landing_error_weight: [kg/m] minimise propellant + weight x landing error, with a landing point that
             is free in the target's plane; by 'auto', 'convex' or 'casadi'. None lands at the target.
         guess: an earlier Plan of nearly the same flight, for a search that the indirect method cannot start.
@@ -86,15 +87,10 @@ def solve_pdg(
         InfeasibleError: no flight within the limits exists; proved by `error.plan.certificate`.
         SolverFailedError: the solver gave no answer.
     """
-    problem = LandingProblem(
-        State.parse(state),
-        finite_vector("target", target, 3),
-        lander,
-        finite_vector("gravity", gravity, 3),
-        _with_shorthands(limits, glide_slope=glide_slope_limit, speed=speed_limit),
-        finite_vector("target_velocity", target_velocity, 3),
-        finite_vector("angular_velocity", angular_velocity, 3),
-    )
+    vectors = (target, gravity, target_velocity, angular_velocity)
+    place, pull, arrival, spin = (cast("Array", vector) for vector in vectors)  # the problem checks them
+    limits = _with_shorthands(limits, glide_slope=glide_slope_limit, speed=speed_limit)
+    problem = LandingProblem(State.parse(state), place, lander, pull, limits, arrival, spin)
     _check_choices(nodes, method, unreachable, guess)
     weight = _weight(landing_error_weight, method)
     request = Request(problem, nodes, _seconds(time_of_flight), method, guess, landing_error_weight=weight)

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
+from guidance.descent.certificate import Certificate
 from guidance.descent.plan import Plan, PlanStatus
 from guidance.descent.problem import LandingProblem
+from guidance.flight_time.nearest_landing import find_nearest_landing
 from guidance.flight_time.primer_trajectory import lay_nodes
 from guidance.flight_time.primer_vector import PrimerFlight
 
@@ -14,17 +18,42 @@ NOT_FOUND = (
 )
 
 
-def plan_indirect(problem: LandingProblem, nodes: int, flight: PrimerFlight | None) -> Plan:
+def plan_indirect(
+    problem: LandingProblem,
+    nodes: int,
+    flight: PrimerFlight | None,
+    proof: Callable[[Plan], Certificate | None] | None = None,
+) -> Plan:
     """Plan along a flight of the indirect method.
 
     Args:
         problem: what it solves.
         nodes: N, shared among the arcs; two for each arc at least.
         flight: what `find_primer_flight` found.
+        proof: what makes the plan's certificate.
 
     Returns:
         A plan that is OPTIMAL; or LIMIT_REACHED where there is no flight: others may find one.
     """
     if flight is None:
         return Plan(PlanStatus.LIMIT_REACHED, problem, METHOD, message=NOT_FOUND)
-    return Plan.of_flight(PlanStatus.OPTIMAL, problem, METHOD, lay_nodes(problem, flight, nodes))
+    laid = lay_nodes(problem, flight, nodes)
+    return Plan.of_flight(PlanStatus.OPTIMAL, problem, METHOD, laid, proof=proof)
+
+
+def plan_nearest_indirect(problem: LandingProblem, nodes: int, overdrawn: PrimerFlight | None) -> Plan:
+    """Plan to the point nearest to the target that the tank pays for.
+
+    Args:
+        problem: what cannot be reached.
+        nodes: as of `plan_indirect`.
+        overdrawn: the extremal to the target itself, which burns more than there is; None if none is known.
+
+    Returns:
+        A plan that is NEAREST; or LIMIT_REACHED where the method finds none.
+    """
+    nearest = None if overdrawn is None else find_nearest_landing(problem, overdrawn)
+    if nearest is None:
+        return Plan(PlanStatus.LIMIT_REACHED, problem, METHOD, message=NOT_FOUND)
+    laid = lay_nodes(nearest.problem, nearest.flight, nodes)
+    return Plan.of_flight(PlanStatus.NEAREST, problem, METHOD, laid)

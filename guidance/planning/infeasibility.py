@@ -45,7 +45,8 @@ def prove_at(task: ConvexTask, time: float) -> FarkasProof | ConvexSolution:
     return proof if proof.verified else solution
 
 
-def _closed_form(window: TimeWindow) -> Certificate:
+def prove_by_window(window: TimeWindow) -> Certificate:
+    """What closed-form bounds say where they admit no time of flight."""
     scope = f"every time of flight, on any mesh: closed-form bound on {window.cause}"
     return Certificate(scope, (window.cause,))
 
@@ -54,7 +55,7 @@ def prove_fixed_time(task: ConvexTask, time: float) -> Certificate | None:
     """Certificate for one time of flight; None if there is no verified proof."""
     window = time_window(task.problem, task.free_landing_point)
     if window.empty:
-        return _closed_form(window)
+        return prove_by_window(window)
     cause = forbidden_by(task.problem, time, task.free_landing_point)
     if cause:
         return Certificate(f"time of flight {time:g} s, on any mesh: closed-form bound on {cause}", (cause,))
@@ -67,14 +68,17 @@ def prove_fixed_time(task: ConvexTask, time: float) -> Certificate | None:
     return Certificate(scope, proof.causes, (proof,))
 
 
-def prove_by_dual_bound(problem: LandingProblem, flight: PrimerFlight | None = None) -> Certificate | None:
+def prove_by_dual_bound(
+    problem: LandingProblem, flight: PrimerFlight | None = None, window: TimeWindow | None = None
+) -> Certificate | None:
     """Proof that the tank does not pay for any flight to the target; None where the bound shows none.
 
     Args:
         problem: the landing problem.
         flight: an extremal that breaks a limit, to begin with; None if none is known.
+        window: times of flight that closed-form bounds admit; None to work them out.
     """
-    window = time_window(problem)
+    window = window or time_window(problem)
     if window.empty:
         return None
     return prove_no_flight(problem, guess_time(problem, window) if flight is None else flight.time, flight)
@@ -92,7 +96,7 @@ def prove_free_time(task: ConvexTask) -> Certificate | ConvexSolution | None:
     """
     window = time_window(task.problem, task.free_landing_point)
     if window.empty:
-        return _closed_form(window)
+        return prove_by_window(window)
     if task.problem.rotates:  # no closed form bounds the time of flight
         return None
     proofs = []

@@ -142,7 +142,8 @@ def _measure(scenario: Scenario, lidar: RangingLidar, flight: Flight, error: Arr
     """
     draws = scenario.streams.scan(flight.index, lidar.rays)
     aim = estimation.look_aim(scenario, flight.target, error)
-    cloud = scan(lidar, scenario.tile.elevation, flight.state, aim, draws)
+    tile = scenario.tile
+    cloud = scan(lidar, tile.elevation, flight.state, aim, draws, tile.highest)
     position = flight.state.position + error[:3]
     shift = position - flight.state.position
     aim = aim + shift  # the plane's height is believed as wrongly as the vehicle's own

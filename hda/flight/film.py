@@ -1,6 +1,10 @@
 """A flight as an animated GIF: the ground, the look of the moment, the height, frame by frame.
 
+On a preset with a ranging LIDAR a look is shown as measured: the heights that the lander saw, with their
+holes, its verdict, and the truth beside it.
+
 python -m hda.flight.film --policy hazard-aware --preset hard --episode 17 --out flight.gif
+python -m hda.flight.film --policy hazard-aware --preset lidar --episode 17 --out flight.gif
 """
 
 from __future__ import annotations
@@ -18,7 +22,7 @@ import tyro
 from guidance.arrays import Array
 from guidance.console import one_line_errors, tolerate_encoding
 from hda.flight.episode import fly
-from hda.flight.moment import SIZE, draw_moment, find_moment
+from hda.flight.moment import WIDTH, draw_moment, find_moment
 from hda.flight.outcome import ENDINGS
 from hda.flight.palette import COLORS
 from hda.flight.record import EpisodeRecord
@@ -84,7 +88,7 @@ def film_frames(record: EpisodeRecord, options: FilmOptions) -> Iterator[Image]:
 
     for time in frame_times(record, options):
         figure = draw_moment(find_moment(record, time))
-        figure.set_dpi(options.width / SIZE[0])
+        figure.set_dpi(options.width / WIDTH)
         canvas = FigureCanvasAgg(figure)
         canvas.draw()
         yield Image.fromarray(np.asarray(canvas.buffer_rgba())[..., :3].copy())

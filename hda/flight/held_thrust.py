@@ -158,7 +158,9 @@ def hold_period(
 ) -> tuple[float, int]:
     """Apply a command for one period, ended early by the ground or the tank: (time flown, status)."""
     vehicle = conditions.vehicle
-    applied = commanded * (1.0 + conditions.thrust_error)
+    applied = np.empty(3)
+    for axis in range(3):
+        applied[axis] = commanded[axis] * (1.0 + conditions.thrust_error)
     flow = math.sqrt(applied[0] ** 2 + applied[1] ** 2 + applied[2] ** 2) / vehicle.exhaust_velocity
     burn = conditions.period
     dry = flow * conditions.period >= start[6] - vehicle.dry_mass and flow > 0.0

@@ -1,4 +1,7 @@
-"""The two laws flown over one interval, in compiled code: ZEM/ZEV, and the feedback about a plan."""
+"""The two laws flown over one interval, in compiled code: ZEM/ZEV, and the feedback about a plan.
+
+Numbers are copied one by one: a slice that takes an array compiles for seconds, most of it words of an error.
+"""
 
 from __future__ import annotations
 
@@ -75,7 +78,8 @@ def _fly_zem_zev(
     seen = start.copy()
     limited = 0
     periods = commanded.shape[0] - 1
-    path[0] = start
+    for number in range(7):
+        path[0, number] = start[number]
     time[0] = 0.0
     for k in range(periods + 1):
         remaining = command.time_to_go - command.time_to_go_rate * period * k
@@ -85,9 +89,11 @@ def _fly_zem_zev(
             return k + 2, TOUCHDOWN, limited
         if k == periods:
             break
-        seen[:6] = path[k, :6] + conditions.navigation_error
+        for number in range(6):
+            seen[number] = path[k, number] + conditions.navigation_error[number]
         zem_zev_into(seen, site, gains, remaining, gravity, commanded[k])
-        commanded[k] *= path[k, 6]
+        for axis in range(3):
+            commanded[k, axis] *= path[k, 6]
         if limit_into(commanded[k], vehicle.min_thrust, vehicle.max_thrust, vehicle.pointing_limit):
             limited += 1
         flown, status = hold_period(path[k], commanded[k], conditions, path[k + 1])
@@ -118,7 +124,8 @@ def _fly_plan(
     planned = reference.acceleration.shape[0]
     estimate = 0.0
     limited = 0
-    path[0] = start
+    for number in range(7):
+        path[0, number] = start[number]
     time[0] = 0.0
     for k in range(periods + 1):
         if k >= planned:

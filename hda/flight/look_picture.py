@@ -9,6 +9,7 @@ import numpy as np
 from hda.flight.palette import COLORS
 from hda.flight.picture import draw_true_safety
 from hda.flight.record import EpisodeRecord
+from hda.ground.tile import Tile
 from hda.task.observation import Observation
 
 if TYPE_CHECKING:
@@ -19,8 +20,13 @@ HOLE_COLOR = COLORS[1]
 _PERCENTILES = (2.0, 98.0)  # of the heights, between which the colours lie
 
 
-def draw_elevation(axis: Axes, observation: Observation) -> None:
+def draw_elevation(axis: Axes, observation: Observation, colors: str = "cividis") -> None:
     """Draw the measured heights, holes in a colour of their own, over the look's square.
+
+    Args:
+        axis: where.
+        observation: of a ranging LIDAR.
+        colors: matplotlib's name of the heights' colour map.
 
     Raises:
         ValueError: the sensor gave no heights.
@@ -38,7 +44,7 @@ def draw_elevation(axis: Axes, observation: Observation) -> None:
             np.ma.masked_invalid(height),
             origin="lower",
             extent=(west, west + grid.columns * side, south, south + grid.rows * side),
-            cmap=colormaps["cividis"].with_extremes(bad=HOLE_COLOR),
+            cmap=colormaps[colors].with_extremes(bad=HOLE_COLOR),
             vmin=float(low),
             vmax=max(float(high), float(low) + 0.1),
         )
@@ -57,6 +63,14 @@ def draw_verdict(axis: Axes, observation: Observation) -> None:
         vmin=-0.6,
         vmax=1.2,
     )
+    _frame(axis, observation)
+
+
+def draw_truth(axis: Axes, observation: Observation, tile: Tile) -> None:
+    """Draw the true safety over the look's square; safe ground is light."""
+    draw_true_safety(axis, tile)
+    axis.set_xlabel("")
+    axis.set_ylabel("")
     _frame(axis, observation)
 
 
@@ -83,8 +97,7 @@ def draw_looks(record: EpisodeRecord, most: int = 6) -> Figure:
         grid = observation.elevation_grid
         draw_elevation(row[0], observation)
         draw_verdict(row[1], observation)
-        draw_true_safety(row[2], record.scenario.tile)
-        _frame(row[2], observation)
+        draw_truth(row[2], observation, record.scenario.tile)
         for axis in row:
             axis.plot(*site[:2], "+", color=COLORS[0], markersize=11, markeredgewidth=1.8)
         height = observation.state.position[2] - observation.target[2]

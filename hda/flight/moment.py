@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from guidance.arrays import Array
+from hda.flight.look_picture import draw_elevation, draw_truth, draw_verdict
 from hda.flight.outcome import ENDINGS
 from hda.flight.palette import COLORS
 from hda.flight.picture import draw_field_of_view, draw_true_safety, shown_ground
@@ -17,8 +18,11 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-SIZE = (10.0, 3.9)
-"""[inch] width and height of the picture."""
+WIDTH = 10.0
+"""[inch] of the picture."""
+
+_HEIGHT = 3.9  # [inch]
+_MEASURED_HEIGHT = 7.4  # [inch] of the picture of a flight with measured looks, which has a second row
 
 _FLAME = 0.012  # [m/N] of the line that stands for the thrust
 
@@ -62,15 +66,23 @@ def find_moment(record: EpisodeRecord, time: float) -> Moment:
 def draw_moment(moment: Moment) -> Figure:
     """Draw a moment: the ground with the flight so far, the look that guides it, its height.
 
+    Of a measured look the heights that the lander saw, its verdict and the truth stand side by side.
+
     Returns:
         The figure, not tied to any window.
     """
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=SIZE, layout="constrained")
-    ground, view, height = figure.subplots(1, 3)
+    measured = moment.record.observations[moment.look].ground is not None
+    figure = Figure(figsize=(WIDTH, _MEASURED_HEIGHT if measured else _HEIGHT), layout="constrained")
+    if measured:
+        axes = figure.subplot_mosaic([["ground", "height", "height"], ["seen", "verdict", "truth"]])
+        _draw_measured_look(axes["seen"], axes["verdict"], axes["truth"], moment)
+        ground, height = axes["ground"], axes["height"]
+    else:
+        ground, view, height = figure.subplots(1, 3)
+        _draw_look(view, moment)
     _draw_ground(ground, moment)
-    _draw_look(view, moment)
     _draw_height(height, moment)
     figure.suptitle(_describe(moment), x=0.01, ha="left", family="monospace", fontsize="medium")
     return figure
@@ -107,6 +119,24 @@ def _draw_look(axis: Axes, moment: Moment) -> None:
     axis.set_yticks([])
     axis.set_xlabel(f"{observation.width:.3g} m wide, taken at {observation.time:.0f} s")
     axis.set_title(f"look {observation.index + 1}, light: looks safe", fontsize="medium")
+
+
+def _draw_measured_look(seen: Axes, verdict: Axes, truth: Axes, moment: Moment) -> None:
+    record = moment.record
+    observation, site = record.observations[moment.look], record.decisions[moment.look].site
+    draw_elevation(seen, observation, "gray")
+    draw_verdict(verdict, observation)
+    draw_truth(truth, observation, record.scenario.tile)
+    for axis in (seen, verdict, truth):
+        axis.plot(
+            *site[:2], "o", color=COLORS[5], markersize=8, fillstyle="none", markeredgewidth=2, label="target"
+        )
+        axis.set_xticks([])
+        axis.set_yticks([])
+    seen.set_xlabel(f"{observation.width:.3g} m wide, taken at {observation.time:.0f} s")
+    seen.set_title(f"look {observation.index + 1}: heights, orange: no echo", fontsize="medium")
+    verdict.set_title("verdict on board, light: looks safe", fontsize="medium")
+    truth.set_title("truth there, light: safe", fontsize="medium")
 
 
 def _draw_height(axis: Axes, moment: Moment) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -44,6 +45,11 @@ class Tile:
             if layer.shape != self.elevation.shape or layer.ndim != 2:
                 raise ValueError(f"{name} must have shape {self.elevation.shape}, got {layer.shape}")
             layer.flags.writeable = False
+
+    @cached_property
+    def highest(self) -> float:
+        """[m] the greatest known height."""
+        return float(np.nanmax(self.elevation))
 
     def is_safe(self, position: Array) -> bool:
         """Whether the cell under `position` [m] is safe; outside the map nothing is."""

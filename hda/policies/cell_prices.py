@@ -103,7 +103,9 @@ def price_blindly(
 ) -> float:
     """Fill J as if no later look, or each with a share of the failures left, helped; the least J without."""
     n = safe.shape[0]
-    least = np.full(n, np.inf)
+    least = np.empty(n)
+    for column in range(n):
+        least[column] = np.inf
     chance = np.empty(n, dtype=np.float32)
     smoothed = np.zeros((5, n))  # along their columns, of the rows about the one that is priced
     averted, all_failures = prices.divert + prices.failure * share, prices.divert + prices.failure

@@ -74,8 +74,8 @@ def _squared_distance_into(marked: NDArray[np.bool_], limit: int, out: NDArray[n
         least = far
         for column in range(columns):
             square[column] = np.int32(here[column] * here[column])
+            nearest[column] = square[column]
             least = min(least, here[column])
-        nearest[:] = square
         greatest, step = (limit * limit if least < far else 0), 1
         while step < reach and step * step < greatest:
             west, east, more = padded[reach - step :], padded[reach + step :], np.int32(step * step)

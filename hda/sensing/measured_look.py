@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from guidance.arrays import Array
 from hda.safety.criteria import SafetyCriteria
 from hda.safety.lander_footprint import LanderFootprint, make_footprint
-from hda.safety.safety_map import assess_safety
+from hda.safety.safety_map import assess_on_board
 from hda.safety.touchdown_stance import Stance
 from hda.sensing.gridding import ElevationMap, PixelGrid, grid_points, lay_grid
 from hda.sensing.ranging import PointCloud, RangingLidar
@@ -112,9 +112,8 @@ def assess_elevation(elevation: ElevationMap, criteria: SafetyCriteria) -> Measu
     grid = elevation.grid
     if not _lander_fits(grid, criteria):
         return MeasuredGround(elevation, np.zeros(grid.shape), np.zeros(grid.shape, dtype=np.bool_))
-    limits: dict[str, Any] = asdict(criteria) | {"range_noise": elevation.spread}
-    safety = assess_safety(elevation.height, grid.pixel_size, **limits)
-    return MeasuredGround(elevation, safety.probability, ~np.isnan(safety.slope))
+    probability, known = assess_on_board(elevation.height, grid.pixel_size, elevation.spread, criteria)
+    return MeasuredGround(elevation, probability, known)
 
 
 def find_holes(ground: MeasuredGround, criteria: SafetyCriteria) -> NDArray[np.bool_]:

@@ -204,47 +204,61 @@ def _scan_into(
     """Send every ray; return the number of echoes written."""
     ranges, jitters, dropouts = draws
     rays = ranges.shape[0]
-    origin, believed, ray = np.empty(3), np.empty(3), np.empty(3)
-    believed_velocity = view.velocity + errors.motion
+    x0, y0, z0 = view.position[0], view.position[1], view.position[2]
+    vx, vy, vz = view.velocity[0], view.velocity[1], view.velocity[2]
+    aim_x, aim_y, aim_z = view.offset[0], view.offset[1], view.offset[2]
+    believed_vx, believed_vy, believed_vz = (
+        vx + errors.motion[0],
+        vy + errors.motion[1],
+        vz + errors.motion[2],
+    )
+    tilt_x, tilt_y, about_z = errors.attitude[0], errors.attitude[1], errors.attitude[2]
+    offset, deviation = echoes
     count = 0
     for i in range(rays):
         for j in range(rays):
             if dropouts[i, j] < errors.dropout:
                 continue
             age = timing.latency + timing.duration * (1.0 - (i * rays + j + 1.0) / (rays * rays))
-            for axis in range(3):
-                origin[axis] = view.position[axis] - age * view.velocity[axis]
-                believed[axis] = view.offset[axis] + age * believed_velocity[axis]
-            believed[0] += ((j + 0.5) / rays - 0.5) * view.width
-            believed[1] += ((i + 0.5) / rays - 0.5) * view.width
-            across = math.sqrt(believed[0] ** 2 + believed[1] ** 2)
-            if across > -view.limit * believed[2]:
+            x = aim_x + age * believed_vx + ((j + 0.5) / rays - 0.5) * view.width
+            y = aim_y + age * believed_vy + ((i + 0.5) / rays - 0.5) * view.width
+            z = aim_z + age * believed_vz
+            across = math.sqrt(x**2 + y**2)
+            if across > -view.limit * z:
                 continue
-            believed /= math.sqrt(across * across + believed[2] ** 2)
-            about_x = errors.attitude[0] + errors.jitter * jitters[i, j, 0]
-            about_y = errors.attitude[1] + errors.jitter * jitters[i, j, 1]
-            about_z = errors.attitude[2]
-            ray[0] = believed[0] + about_y * believed[2] - about_z * believed[1]
-            ray[1] = believed[1] + about_z * believed[0] - about_x * believed[2]
-            ray[2] = believed[2] + about_x * believed[1] - about_y * believed[0]
-            ray /= math.sqrt(ray[0] ** 2 + ray[1] ** 2 + ray[2] ** 2)
-            distance, east, north = find_ground(elevation, origin, ray, view.top)
+            length = math.sqrt(across * across + z**2)
+            x, y, z = x / length, y / length, z / length
+            about_x = tilt_x + errors.jitter * jitters[i, j, 0]
+            about_y = tilt_y + errors.jitter * jitters[i, j, 1]
+            ray_x = x + about_y * z - about_z * y
+            ray_y = y + about_z * x - about_x * z
+            ray_z = z + about_x * y - about_y * x
+            length = math.sqrt(ray_x**2 + ray_y**2 + ray_z**2)
+            ray_x, ray_y, ray_z = ray_x / length, ray_y / length, ray_z / length
+            origin = (x0 - age * vx, y0 - age * vy, z0 - age * vz)
+            distance, east, north = find_ground(elevation, origin, (ray_x, ray_y, ray_z), view.top)
             if math.isnan(distance):
                 continue
-            cosine = (east * ray[0] + north * ray[1] - ray[2]) / math.sqrt(1.0 + east * east + north * north)
+            cosine = (east * ray_x + north * ray_y - ray_z) / math.sqrt(1.0 + east * east + north * north)
             tangent = math.sqrt(max(1.0 - cosine * cosine, 0.0)) / max(cosine, 1e-3)
             own = errors.noise_per_metre * distance
             inclined = 0.25 * errors.divergence * distance * tangent
             measured = distance + errors.bias + math.sqrt(own * own + inclined * inclined) * ranges[i, j]
-            for axis in range(3):
-                echoes.offset[count, axis] = measured * believed[axis] - age * believed_velocity[axis]
-            echoes.deviation[count] = errors.noise_per_metre * measured * -believed[2]
+            offset[count, 0] = measured * x - age * believed_vx
+            offset[count, 1] = measured * y - age * believed_vy
+            offset[count, 2] = measured * z - age * believed_vz
+            deviation[count] = errors.noise_per_metre * measured * -z
             count += 1
     return count
 
 
 def scan(
-    lidar: RangingLidar, elevation: NDArray[np.float32], state: State, target: Array, draws: ScanDraws
+    lidar: RangingLidar,
+    elevation: NDArray[np.float32],
+    state: State,
+    target: Array,
+    draws: ScanDraws,
+    highest: float | None = None,
 ) -> PointCloud:
     """Scan the ground around `target`.
 
@@ -256,6 +270,7 @@ def scan(
         state: true state at the decision, above the target.
         target: [m] shape (3,), where the scan is centred, on the target plane.
         draws: of this scan, for `lidar.rays` rays.
+        highest: [m] the greatest known height; found in `elevation` if left out.
 
     Raises:
         ValueError: the draws are of another number of rays.
@@ -272,7 +287,7 @@ def scan(
             target - state.position,
             rays * lidar.ray_spacing(state.position, target),
             math.tan(lidar.off_nadir_limit),
-            float(np.nanmax(elevation)),
+            float(np.nanmax(elevation)) if highest is None else highest,
         ),
         _Errors(
             lidar.pointing_error * draws.attitude,

@@ -17,6 +17,8 @@ from guidance.kernel import compile_kernel
 
 _ROUNDING = 1e-6  # [m] below the ground by which a ray may enter a patch
 _FARTHEST = 1e7  # [m] where a vertical ray ends
+Vector = Array | tuple[float, float, float]
+
 _NO_HIT = (math.nan, 0.0, 0.0)
 
 
@@ -31,14 +33,14 @@ def _span_inside(start: float, step: float, last: float) -> tuple[float, float]:
 
 @compile_kernel
 def find_ground(
-    elevation: NDArray[np.float32], origin: Array, direction: Array, top: float
+    elevation: NDArray[np.float32], origin: Vector, direction: Vector, top: float
 ) -> tuple[float, float, float]:
     """Range at which a ray first meets the ground, and the ground's slope there.
 
     Args:
         elevation: [m] shape (rows, columns), 1 m a cell, cell (0, 0) centred at (0.5, 0.5) m; NaN for a hole.
-        origin: [m] shape (3,).
-        direction: shape (3,), a unit vector.
+        origin: [m] three numbers.
+        direction: three numbers, a unit vector.
         top: [m] no ground is higher.
 
     Returns:
@@ -60,9 +62,10 @@ def find_ground(
         return _NO_HIT
     column = min(max(math.floor(u0 + t * du), 0), columns - 2)
     row = min(max(math.floor(v0 + t * dv), 0), rows - 2)
+    east_side, north_side = (1.0 if du > 0.0 else 0.0), (1.0 if dv > 0.0 else 0.0)
+    to_column = (column + east_side - u0) / du if du != 0.0 else np.inf
+    to_row = (row + north_side - v0) / dv if dv != 0.0 else np.inf
     while True:
-        to_column = (column + (1.0 if du > 0.0 else 0.0) - u0) / du if du != 0.0 else np.inf
-        to_row = (row + (1.0 if dv > 0.0 else 0.0) - v0) / dv if dv != 0.0 else np.inf
         leave = max(min(to_column, to_row, end), t)
         corner = elevation[row, column]
         east = elevation[row, column + 1] - corner
@@ -91,7 +94,9 @@ def find_ground(
         t = leave
         if to_column <= to_row:
             column += 1 if du > 0.0 else -1
+            to_column = (column + east_side - u0) / du
         else:
             row += 1 if dv > 0.0 else -1
+            to_row = (row + north_side - v0) / dv
         if not (0 <= column < columns - 1 and 0 <= row < rows - 1):
             return _NO_HIT

@@ -8,7 +8,7 @@ bits are those of the same sums one by one. Without compilation (`NUMBA_DISABLE_
 from __future__ import annotations
 
 import operator
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from llvmlite import ir
@@ -76,14 +76,16 @@ def _store_positive(typing_context, lanes, array, index):
     return types.void(lanes, array, types.intp), generate
 
 
-@intrinsic
-def _add(typing_context, first, second):
+def _generate_sum(typing_context: Any, first: Any, second: Any) -> Any:
     return first(first, second), lambda context, builder, signature, pair: builder.fadd(*pair)
 
 
-@intrinsic
-def _multiply(typing_context, first, second):
+def _generate_product(typing_context: Any, first: Any, second: Any) -> Any:
     return first(first, second), lambda context, builder, signature, pair: builder.fmul(*pair)
+
+
+_add: Any = intrinsic(_generate_sum)
+_multiply: Any = intrinsic(_generate_product)
 
 
 @overload(operator.add)
@@ -114,9 +116,11 @@ def _store_plainly(lanes: Array32, array: Array32, index: int) -> None:
     array[index : index + LANES] = np.maximum(lanes, np.float32(0.0))
 
 
-load_lanes: Any = _load_plainly if config.DISABLE_JIT else _load
+_compiled = not cast("Any", config).DISABLE_JIT  # numba names its settings at run time
+
+load_lanes: Any = _load if _compiled else _load_plainly
 """Sixteen elements of a flat array, from an index on: neither end is checked."""
-spread_element: Any = _spread_plainly if config.DISABLE_JIT else _load_spread
+spread_element: Any = _load_spread if _compiled else _spread_plainly
 """An element of a flat array on every lane."""
-store_positive: Any = _store_plainly if config.DISABLE_JIT else _store_positive
+store_positive: Any = _store_positive if _compiled else _store_plainly
 """Write the lanes, negative ones as zero, to a flat array from an index on."""

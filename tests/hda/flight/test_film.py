@@ -49,6 +49,16 @@ def test_the_command_films_an_agent_and_keeps_under_its_size(
     assert 1000 < out.stat().st_size < 1_500_000
 
 
+def test_a_film_of_measured_looks_keeps_under_its_size(tmp_path: Path) -> None:
+    """Six times as many frames as a second of flight have stay below; the command's own step gives more."""
+    out = tmp_path / "measured.gif"
+    film_flight("nearest-safe", FilmedEpisode("lidar", 17), out=out, film=FilmOptions(step=3.0))
+    with Image.open(out) as film:
+        assert film.size == (800, 592)
+        assert film.n_frames > 15  # pyright: ignore[reportAttributeAccessIssue]
+    assert 10_000 < out.stat().st_size < 1_500_000
+
+
 def test_what_cannot_be_filmed_is_refused_before_it_flies(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"out must end in \.gif"):
         film_flight(out=tmp_path / "flight.mp4")

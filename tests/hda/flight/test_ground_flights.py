@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import hda
+from guidance.two_impulse import divert_cost
 from hda.flight.episode import advance, begin_flight, fly, observe
 from hda.flight.record import EpisodeRecord
 from hda.flight.touchdown_report import TouchdownFault
@@ -154,6 +155,17 @@ def test_the_oracles_know_the_true_height(scenarios):
         for decision in record.decisions:
             assert decision.site[2] == true_contact(scenarios[1], decision.site)
         assert record.outcome.success
+
+
+def test_ten_metres_of_height_change_the_price_of_a_site_by_less_than_a_hundredth(scenarios):
+    """So that sites may be priced on the level of the present target."""
+    for scenario in scenarios:
+        view, state = scenario.view, scenario.initial_state
+        east, north = (scenario.nominal_target[axis] + np.linspace(-200.0, 200.0, 9) for axis in (0, 1))
+        low, high = (
+            divert_cost(state, east, north, height, view.lander, view.gravity) for height in (40.0, 50.0)
+        )
+        assert (np.abs(high / low - 1.0) < 0.01).all()
 
 
 def test_planned_descents_follow_a_new_height_without_a_fallback(scenarios):

@@ -62,3 +62,24 @@ def test_the_last_picture_says_how_it_ended(record: EpisodeRecord) -> None:
     words = ENDINGS[record.outcome.ending]
     assert draw_moment(find_moment(record, np.inf)).get_suptitle().endswith(words)
     assert words not in draw_moment(find_moment(record, 3.0)).get_suptitle()
+
+
+def test_a_measured_look_is_shown_beside_the_truth() -> None:
+    flown = fly(hda.make_policy("nearest-safe"), hda.sample_scenario("lidar-coarse", 0, 3))
+    for time in (1.0, 12.25):
+        moment = find_moment(flown, time)
+        axes = {axis.get_label(): axis for axis in draw_moment(moment).axes}
+        assert set(axes) == {"ground", "height", "seen", "verdict", "truth"}
+        observation, tile = flown.observations[moment.look], flown.scenario.tile
+        shown = {name: axes[name].images[0] for name in ("seen", "verdict", "truth")}
+        drawn = {name: np.ma.asarray(image.get_array()) for name, image in shown.items()}
+        assert observation.elevation is not None
+        np.testing.assert_array_equal(np.ma.getmaskarray(drawn["seen"]), np.isnan(observation.elevation))
+        np.testing.assert_array_equal(drawn["verdict"], observation.safety_map)
+        np.testing.assert_array_equal(drawn["truth"], tile.deterministic)
+        site = flown.decisions[moment.look].site
+        for name in shown:
+            assert np.ravel(line_data(axes[name], "target")) == pytest.approx(site[:2])
+            middle = np.mean(axes[name].get_xlim()), np.mean(axes[name].get_ylim())
+            assert middle == pytest.approx(tuple(observation.target[:2]))
+        assert np.array_equal(np.column_stack(line_data(axes["ground"], "flight")), moment.path[:, :2])

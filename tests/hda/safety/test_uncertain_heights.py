@@ -8,8 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from hda.safety.criteria import SafetyCriteria
 from hda.safety.lander_footprint import make_footprint
-from hda.safety.safety_map import assess_safety
+from hda.safety.safety_map import assess_on_board, assess_safety
 from tests.hda.safety.test_safety_map import LANDERS, SEEDS, rough_ground
 from tests.oracles import algorithm_1
 
@@ -75,3 +76,24 @@ def test_more_error_makes_safe_ground_less_sure_and_unsafe_ground_less_sure_too(
 def test_bad_errors_are_named(noise, message: str):
     with pytest.raises(ValueError, match=message):
         assess_safety(np.zeros((20, 20)), range_noise=noise)
+
+
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    side=st.sampled_from([1.0, 1.25, 2.5]),
+    boulders=st.floats(0.0, 0.1),
+    rise=st.floats(0.0, 0.35),
+)
+@settings(max_examples=60)
+def test_on_board_runs_of_steep_sites_change_nothing(
+    seed: int, side: float, boulders: float, rise: float
+) -> None:
+    """Steep sites in runs of all lengths, and holes: against the path of one common error, without runs."""
+    rng = np.random.default_rng(seed)
+    dem = rng.normal(scale=0.03, size=(30, 70)) + rise * side * np.abs(np.arange(70) - 35.0)
+    dem += 1.5 * (rng.random(dem.shape) < boulders)
+    dem[rng.random(dem.shape) < 0.004] = np.nan
+    whole = assess_safety(dem, side, range_noise=0.02)
+    probability, known = assess_on_board(dem, side, np.full(dem.shape, 0.02), SafetyCriteria())
+    np.testing.assert_array_equal(known, ~np.isnan(whole.slope))
+    np.testing.assert_allclose(probability, whole.probability, rtol=0, atol=1e-12)

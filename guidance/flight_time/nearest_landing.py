@@ -1,0 +1,205 @@
+"""The reachable point nearest to the target, by the indirect method.
+
+Let s be a landing point in the target's plane, seen from the target, and J(s) the least propellant to it. J
+changes with s as b.ds does, where b is the slope of the primer in the time before the landing: the costate of
+the position. Of the points that a tank pays for, the nearest has
+
+    J(s) = the content of the tank,    b along -s, horizontally,
+
+two equations for the two numbers s. Of the points at one distance from the target, the cheapest has the
+second one too. Newton's method in s solves either pair; at each s the extremal follows from the one before.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from guidance.arrays import Array
+from guidance.descent.problem import LandingProblem
+from guidance.flight_time.extremal import (
+    Extremal,
+    PrimerProblem,
+    blank_extremal,
+    copy_extremal,
+    new_extremal,
+)
+from guidance.flight_time.path_limits import ALTITUDE, KEPT, PROPELLANT, burnt_share
+from guidance.flight_time.primer_equations import FREE, TOUCHING, solve_from, solve_touching
+from guidance.flight_time.primer_vector import PrimerFlight, fly_to
+from guidance.kernel import compile_kernel
+
+ERROR_SHARE, ERROR_SLACK = 1e-3, 0.05
+"""Of the least landing error, and [m] beside it: how much farther from the target the cheapest flight is."""
+_MOST_STEPS = 30
+_MOST_HALVINGS = 12
+_CONVERGED = 1e-9  # of the square of the time of flight: millimetres
+_DIFFERENCE = 1e-5  # of the same
+_LONGEST = 0.1  # of the same: step
+
+
+@compile_kernel
+def _land_at(point: Array, problem: PrimerProblem, size: int, x: Extremal) -> bool:
+    """Find the extremal to a landing point from one nearby, in place."""
+    r, v, g, flow = problem
+    place = r.copy()
+    place[0], place[1] = r[0] - point[0], r[1] - point[1]
+    return solve_from(x, PrimerProblem(place, v, g, flow), size)
+
+
+@compile_kernel
+def _set_misses(
+    point: Array, x: Extremal, problem: PrimerProblem, goal: tuple[float, float], out: Array
+) -> bool:
+    """Write by which lengths the two equations are missed, shape (2,); False where they say nothing."""
+    share, distance = goal
+    span = x.times[1] - x.times[0]
+    east, north = (x.primer[0, 0] - x.primer[1, 0]) / span, (x.primer[0, 1] - x.primer[1, 1]) / span
+    slope = math.hypot(east, north)
+    if not slope > 0.0:
+        return False
+    if math.isnan(distance):
+        out[0] = (burnt_share(x, problem.mass_flow) - share) / (problem.mass_flow * slope)
+    else:
+        out[0] = math.hypot(point[0], point[1]) - distance
+    out[1] = (east * point[1] - north * point[0]) / slope
+    return True
+
+
+@compile_kernel
+def _newton_step(
+    point: Array, x: Extremal, problem: PrimerProblem, goal: tuple[float, float], size: int, here: Array
+) -> tuple[float, float]:
+    """Full step towards a root of the misses, from differences; nan where there is none."""
+    step, there, moved, trial = _DIFFERENCE * x.times[2] ** 2, np.empty(2), point.copy(), new_extremal()
+    slopes = np.empty((2, 2))
+    for k in range(2):
+        moved[k] = point[k] + step
+        copy_extremal(x, trial)
+        if not _land_at(moved, problem, size, trial) or not _set_misses(moved, trial, problem, goal, there):
+            return math.nan, math.nan
+        for i in range(2):
+            slopes[i, k] = (there[i] - here[i]) / step
+        moved[k] = point[k]
+    determinant = slopes[0, 0] * slopes[1, 1] - slopes[0, 1] * slopes[1, 0]
+    if determinant == 0.0:
+        return math.nan, math.nan
+    east = (slopes[0, 1] * here[1] - slopes[1, 1] * here[0]) / determinant
+    north = (slopes[1, 0] * here[0] - slopes[0, 0] * here[1]) / determinant
+    return east, north
+
+
+@compile_kernel
+def solve_nearest(
+    point: Array, problem: PrimerProblem, goal: tuple[float, float], size: int, x: Extremal
+) -> bool:
+    """Find the nearest landing point that a share of the start mass pays for, or the cheapest at a distance.
+
+    Args:
+        point: seen from the target, shape (2,), where to begin; the answer.
+        problem: that of the target, in seconds; its lengths are over full thrust by start mass.
+        goal: the share, and nan; or anything, and the distance.
+        size: FREE, or TOUCHING where x touches the ground.
+        x: the extremal to that point, in seconds; that of the answer.
+
+    Returns:
+        Whether it was found, and no point nearby is nearer, or cheaper.
+    """
+    here, there, moved, trial = np.empty(2), np.empty(2), np.empty(2), new_extremal()
+    if not _set_misses(point, x, problem, goal, here):
+        return False
+    for _ in range(_MOST_STEPS):
+        unit = x.times[2] ** 2
+        before = math.hypot(here[0], here[1])
+        if before < _CONVERGED * unit:
+            slope = x.primer[0] - x.primer[1]
+            return slope[0] * point[0] + slope[1] * point[1] < 0.0
+        east, north = _newton_step(point, x, problem, goal, size, here)
+        if math.isnan(east):
+            return False
+        damping, better = min(1.0, _LONGEST * unit / max(math.hypot(east, north), 1e-300)), False
+        for _ in range(_MOST_HALVINGS):
+            moved[0], moved[1] = point[0] + damping * east, point[1] + damping * north
+            copy_extremal(x, trial)
+            if _land_at(moved, problem, size, trial) and _set_misses(moved, trial, problem, goal, there):
+                better = math.hypot(there[0], there[1]) < (1.0 - 0.1 * damping) * before
+            if better:
+                break
+            damping *= 0.5
+        if not better:
+            return False
+        copy_extremal(trial, x)
+        point[0], point[1], here[0], here[1] = moved[0], moved[1], there[0], there[1]
+    return False
+
+
+@dataclass(frozen=True, eq=False)
+class NearestLanding:
+    """A flight to a point near the target.
+
+    Attributes:
+        problem: the landing there.
+        flight: the flight of least propellant to it.
+    """
+
+    problem: LandingProblem
+    flight: PrimerFlight
+
+
+def find_nearest_landing(problem: LandingProblem, overdrawn: PrimerFlight) -> NearestLanding | None:
+    """The cheapest flight to within a little more than the least landing error that the tank pays for.
+
+    Args:
+        problem: the landing problem.
+        overdrawn: its extremal, which burns more than there is.
+
+    Returns:
+        The flight; None where none was found, or the one found breaks a limit of the problem.
+    """
+    if overdrawn.broken != PROPELLANT or problem.limits.line_of_sight is not None:
+        return None
+    x, unit = blank_extremal(), problem.lander.max_thrust / problem.state.mass
+    copy_extremal(overdrawn.extremal, x)
+    goal = -math.expm1(-problem.log_mass_ratio), ERROR_SLACK / unit
+    point, touching = np.zeros(2), False
+    while _seek_nearest(overdrawn.scaled, goal, touching, x, point):
+        target = problem.target.copy()
+        target[:2] += unit * point
+        there = replace(problem, target=target)
+        flight = fly_to(there, x, TOUCHING if touching else FREE)
+        if flight is None or flight.broken == KEPT:
+            return None if flight is None else NearestLanding(there, flight)
+        if touching or flight.broken != ALTITUDE:
+            return None
+        touching = True
+    return None
+
+
+@compile_kernel
+def _seek_nearest(
+    problem: PrimerProblem, goal: tuple[float, float], touching: bool, x: Extremal, point: Array
+) -> bool:
+    """Find the cheapest landing within the granted error, in place.
+
+    Args:
+        problem: that of the target, in seconds.
+        goal: the share of the start mass that is propellant, and the error granted beside ERROR_SHARE.
+        touching: whether the flight touches the ground; `point` is then near the answer.
+        x: the extremal to the point; the answer.
+        point: where to begin; the answer.
+    """
+    share, slack = goal
+    size = TOUCHING if touching else FREE
+    if touching:
+        r, v, g, flow = problem
+        place = r.copy()
+        place[0], place[1] = r[0] - point[0], r[1] - point[1]
+        if not solve_touching(PrimerProblem(place, v, g, flow), x):
+            return False
+    if not solve_nearest(point, problem, (share, math.nan), size, x):
+        return False
+    near = math.hypot(point[0], point[1])
+    far = (1.0 + ERROR_SHARE) * near + slack
+    return solve_nearest(point, problem, (share, far), size, x)
