@@ -20,13 +20,15 @@ from hda.flight.outcome import Contact, Outcome, RewardTerms, classify, score_st
 from hda.flight.record import EpisodeRecord
 from hda.flight.touchdown_report import judge_touchdown
 from hda.flight.vehicle import ControlPeriods, FlightErrors, FlightStatus, Segment, Surroundings, fly_over
+from hda.navigation.navigation_state import NavigationState
 from hda.policy import Decision, Memory, Policy, PrivilegedPolicy
 from hda.safety.touchdown_stance import Stance
 from hda.sensing.lidar import look
 from hda.sensing.measured_look import MeasuredGround, measure_ground
 from hda.sensing.ranging import RangingLidar, scan
+from hda.task import estimation
 from hda.task.observation import Observation
-from hda.task.scenario import Scenario, estimated_state, ground_point
+from hda.task.scenario import Scenario, ground_point
 
 _LATE = 0.5  # of a decision interval: with less time to go no height is changed any more
 
@@ -40,12 +42,14 @@ class Flight:
         state: present state, the true one.
         target: [m] shape (3,), current target, in the frame of the estimated position.
         time_to_go: [s] what remains of the commanded time to go.
+        navigation: the lander's filter, with what this look tells of the site; None on a preset without one.
     """
 
     index: int
     state: State
     target: Array
     time_to_go: float
+    navigation: NavigationState | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,21 +83,24 @@ def begin_flight(scenario: Scenario) -> Flight:
     """Stand at t = 0: first target, and time to go of the quartic to it, or longer under a pointing limit."""
     state, preset = scenario.initial_state, scenario.preset
     target = scenario.nominal_target
-    clock = upright_time_to_go(estimated_state(scenario, state), target, preset.lander, preset.gravity)
-    return Flight(0, state, target, clock)
+    navigation = estimation.begin_estimate(scenario)
+    estimate = estimation.displaced(state, estimation.estimation_error(scenario, navigation, state, target))
+    clock = upright_time_to_go(estimate, target, preset.lander, preset.gravity)
+    return Flight(0, state, target, clock, navigation)
 
 
 def observe(scenario: Scenario, flight: Flight) -> Observation:
     """Take the look of this instant; its noise depends on the episode and the number of the look only."""
     lidar = scenario.preset.lidar
     position = flight.state.position
-    aim = ground_point(scenario, flight.target)
-    estimate, width = estimated_state(scenario, flight.state), lidar.width(position, aim)
+    error = estimation.estimation_error(scenario, flight.navigation, flight.state, flight.target)
+    aim = estimation.look_aim(scenario, flight.target, error)
+    estimate, width = estimation.displaced(flight.state, error), lidar.width(position, aim)
     rules = scenario.preset.rules
     late = flight.index > 0 and flight.time_to_go <= _LATE * rules.decision_interval
     stance, ground = None if late else scenario.preset.stance, None
     if isinstance(lidar, RangingLidar):
-        ground = _measure(scenario, lidar, flight, estimate)
+        ground = _measure(scenario, lidar, flight, error)
         safety_map = ground.safety_map(flight.target, width, lidar.pixels)
     elif lidar.dropout > 0.0 and scenario.streams.map_is_missing(flight.index, lidar.dropout):
         safety_map = np.zeros((lidar.pixels, lidar.pixels), dtype=np.float32)
@@ -110,6 +117,7 @@ def observe(scenario: Scenario, flight: Flight) -> Observation:
         time_to_go=flight.time_to_go,
         ground=ground,
         stance=stance,
+        covariance=None if flight.navigation is None else flight.navigation.relative_covariance,
     )
 
 
@@ -127,18 +135,19 @@ def _measured_target(stance: Stance | None, flight: Flight, ground: MeasuredGrou
     return np.array([target[0], target[1], height if pads > 0 else ground.middle_height(float(target[2]))])
 
 
-def _measure(scenario: Scenario, lidar: RangingLidar, flight: Flight, estimate: State) -> MeasuredGround:
+def _measure(scenario: Scenario, lidar: RangingLidar, flight: Flight, error: Array) -> MeasuredGround:
     """Scan the ground about the target, and assess it where the vehicle believes it to lie.
 
     The sensor points relative to the vehicle: an error of the estimated position moves the points with it.
     """
     draws = scenario.streams.scan(flight.index, lidar.rays)
-    aim = ground_point(scenario, flight.target)
+    aim = estimation.look_aim(scenario, flight.target, error)
     tile = scenario.tile
     cloud = scan(lidar, tile.elevation, flight.state, aim, draws, tile.highest)
-    error = estimate.position - flight.state.position
-    aim = aim + error  # the plane's height is believed as wrongly as the vehicle's own
-    return measure_ground(cloud, lidar, estimate.position, aim, scenario.preset.criteria)
+    position = flight.state.position + error[:3]
+    shift = position - flight.state.position
+    aim = aim + shift  # the plane's height is believed as wrongly as the vehicle's own
+    return measure_ground(cloud, lidar, position, aim, scenario.preset.criteria)
 
 
 def advance(scenario: Scenario, flight: Flight, decision: Decision) -> Step:
@@ -155,18 +164,22 @@ def advance(scenario: Scenario, flight: Flight, decision: Decision) -> Step:
     position = flight.state.position
     aims = [ground_point(scenario, site) for site in (flight.target, decision.site)]
     slant = min(elevation_angle(position, aim) for aim in aims)
+    thrust_error = scenario.streams.thrust_error(flight.index, rules.thrust_error)
+    error = estimation.estimation_error(scenario, flight.navigation, flight.state, flight.target)
+    sensing = estimation.open_sensing(scenario, flight.navigation, flight.target, decision.site, flight.index)
     segment = fly_over(
         flight.state,
         decision,
         preset.lander,
         Surroundings(np.array(preset.gravity), scenario.footing),
         ControlPeriods(rules.control_period, rules.control_periods),
-        FlightErrors(
-            scenario.streams.thrust_error(flight.index, rules.thrust_error), scenario.navigation_error
-        ),
+        FlightErrors(thrust_error, error, sensing),
     )
-    after = Flight(flight.index + 1, segment.final_state, decision.site, segment.time_to_go)
-    landed = segment.status is not FlightStatus.FLYING
+    state, landed = segment.final_state, segment.status is not FlightStatus.FLYING
+    site, following, navigation = decision.site, flight.index + 1, None
+    if not landed:
+        navigation = estimation.next_estimate(scenario, flight.navigation, sensing, state, site, following)
+    after = Flight(following, state, site, segment.time_to_go, navigation)
     truncated = not landed and after.index >= rules.max_decisions
     initial = scenario.initial_state
     outcome = None

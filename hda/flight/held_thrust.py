@@ -14,6 +14,7 @@ from guidance.arrays import Array
 from guidance.dynamics import propagate_into
 from guidance.kernel import compile_kernel
 from hda.flight.ground_contact import Motion, fall_to_ground, hold_over_ground
+from hda.navigation.steering import NO_SENSING, Sensing
 from hda.safety.touchdown_stance import NO_GROUND, Footing
 
 FLYING, TOUCHDOWN, TANK_EMPTY = 0, 1, 2
@@ -47,8 +48,10 @@ class FlightConditions(NamedTuple):
         gravity: [m/s^2] shape (3,), pointing down.
         vehicle: limits of the lander.
         thrust_error: relative error of the applied thrust.
-        navigation_error: estimated minus true position [m] and velocity [m/s], shape (6,).
+        navigation_error: estimated minus true position [m] and velocity [m/s], shape (6,); a filter changes
+            it in place from period to period.
         footing: the lander over the true ground; without ground the flight ends on the plane.
+        sensing: the filter at work, if there is one.
     """
 
     period: float
@@ -58,6 +61,7 @@ class FlightConditions(NamedTuple):
     thrust_error: float
     navigation_error: Array
     footing: Footing = NO_GROUND
+    sensing: Sensing = NO_SENSING
 
 
 @compile_kernel

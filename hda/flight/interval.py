@@ -23,6 +23,7 @@ from hda.flight.held_thrust import (
     fall_freely,
     hold_period,
 )
+from hda.navigation.steering import PlainSensing, name_sensing, sense
 from hda.safety.touchdown_stance import Footing
 
 _LEAST_TELLING = 0.05  # [m/s^2] commanded acceleration under which the engine's error is not estimated
@@ -57,7 +58,7 @@ _PlainFooting = tuple[NDArray[np.float32], Array, float, float, float]
 """`Footing` without names."""
 
 _PlainConditions = tuple[
-    float, float, Array, tuple[float, float, float, float, float], float, Array, _PlainFooting
+    float, float, Array, tuple[float, float, float, float, float], float, Array, _PlainFooting, PlainSensing
 ]
 """`FlightConditions` without names."""
 
@@ -99,6 +100,7 @@ def _fly_zem_zev(
         time[k + 1] = time[k] + flown
         if status != FLYING:
             return k + 2, status, limited
+        sense(conditions.sensing, (path[k], path[k + 1], flown, k), gravity, conditions.navigation_error)
     return periods + 1, FLYING, limited
 
 
@@ -145,6 +147,7 @@ def _fly_plan(
         time[k + 1] = time[k] + flown
         if status != FLYING:
             return k + 2, status, limited
+        sense(conditions.sensing, (path[k], path[k + 1], flown, k), gravity, navigation)
         estimate = _estimate_error(path[k], path[k + 1], commanded[k], period, gravity, estimate)
     return periods + 1, FLYING, limited
 
@@ -173,9 +176,16 @@ def _estimate_error(
 
 @compile_kernel
 def _name_conditions(conditions: _PlainConditions) -> FlightConditions:
-    period, plane, gravity, vehicle, thrust_error, navigation, footing = conditions
+    period, plane, gravity, vehicle, thrust_error, navigation, footing, sensing = conditions
     return FlightConditions(
-        period, plane, gravity, VehicleLimits(*vehicle), thrust_error, navigation, Footing(*footing)
+        period,
+        plane,
+        gravity,
+        VehicleLimits(*vehicle),
+        thrust_error,
+        navigation,
+        Footing(*footing),
+        name_sensing(sensing),
     )
 
 

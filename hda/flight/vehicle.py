@@ -20,6 +20,7 @@ from guidance.state import State
 from guidance.thrust_limits import pointing_angle
 from hda.flight import held_thrust
 from hda.flight.interval import enter_plan, enter_zem_zev
+from hda.navigation.steering import NO_SENSING, Sensing, plain_sensing
 from hda.policy import Decision, ZemZevCommand
 from hda.safety.touchdown_stance import NO_GROUND, Footing
 
@@ -68,10 +69,13 @@ class FlightErrors:
         thrust: relative error of the applied thrust.
         navigation: estimated minus true position [m] and velocity [m/s], shape (6,); the vehicle steers by
             the estimate.
+        sensing: a filter that goes on estimating during the interval, from the given error on; its memory is
+            changed. By default there is none: the error stays.
     """
 
     thrust: float = 0.0
     navigation: Array = field(default_factory=lambda: np.zeros(6))
+    sensing: Sensing = NO_SENSING
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,7 +154,8 @@ def fly_over(
     plane = float(decision.site[2])
     gravity, ground = surroundings.gravity, surroundings.footing
     footing = (ground.elevation, ground.pads, ground.pad_radius, ground.clearance, ground.plane)
-    conditions = (interval.period, plane, gravity, vehicle, errors.thrust, errors.navigation, footing)
+    believed, sensing = errors.navigation.copy(), plain_sensing(errors.sensing)
+    conditions = (interval.period, plane, gravity, vehicle, errors.thrust, believed, footing, sensing)
     start, log, command = state.as_array(), (time, path, commanded), decision.command
     if isinstance(command, ZemZevCommand):
         rate = command.time_to_go_rate

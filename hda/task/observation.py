@@ -75,6 +75,8 @@ class Observation:
         stance: pads and belly of a lander that touches down on real ground; None where sites keep the height
             of the target: on a target plane, and when so little time is left that a new height would trouble
             the flight more than the error of the old.
+        covariance: shape (6, 6), of the errors of position less site [m] and of velocity [m/s], as the filter
+            states it; None without a filter.
     """
 
     index: int
@@ -86,6 +88,7 @@ class Observation:
     time_to_go: float
     ground: MeasuredGround | None = None
     stance: Stance | None = None
+    covariance: Array | None = None
 
     @property
     def has_map(self) -> bool:

@@ -6,6 +6,7 @@ docs/explanation/calibration.md shows what they give beside the paper's row. `pa
 and errors of the estimated state.
 On `lidar` and `lidar-coarse` a look is no longer the true map with noise on it: ranges are measured to the
 same ground, 128 or 64 rays a side, gridded, and assessed on board; and the flight ends on the real ground.
+`navigated` is `lidar` by a lander that finds its state by sensors and a filter.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from guidance.constants import MOON_GRAVITY
 from guidance.lander import PAPER_LANDER, Lander
 from guidance.validation import finite_number, finite_vector, unknown_name
 from hda.ground.own_terrain import OwnTerrain
+from hda.navigation.system import NavigationSystem
 from hda.safety.criteria import SafetyCriteria
 from hda.safety.touchdown_stance import Stance
 from hda.sensing.lidar import Lidar
@@ -41,10 +43,13 @@ class Preset:
         lander: the vehicle.
         gravity: [m/s^2] site frame, pointing down.
         touchdown: where a flight ends, and how it is judged there.
+        navigation: sensors and filter by which the lander knows its state; None: it knows it but for the
+            constant errors of `rules`.
 
     Raises:
-        ValueError: gravity does not point down, a start has no propellant or lies below the target plane, or
-            flights end on real ground whose height no sensor measures.
+        ValueError: gravity does not point down, a start has no propellant or lies below the target plane,
+            flights end on real ground whose height no sensor measures, or there are both a filter and
+            constant errors.
     """
 
     name: str
@@ -56,6 +61,7 @@ class Preset:
     lander: Lander = PAPER_LANDER
     gravity: tuple[float, float, float] = MOON_GRAVITY
     touchdown: Touchdown = field(default_factory=PlaneTouchdown)
+    navigation: NavigationSystem | None = None
 
     def __post_init__(self) -> None:
         """The ground must be below, and the tank must hold something."""
@@ -65,6 +71,9 @@ class Preset:
         finite_number("start.altitude", self.start.altitude.low, above=self.terrain.maximum_elevation)
         if self.stance is not None and not isinstance(self.lidar, RangingLidar):
             raise ValueError("touchdown on real ground needs a lidar that measures ranges")
+        constant = self.rules.navigation_position_error, self.rules.navigation_velocity_error
+        if self.navigation is not None and any(constant):
+            raise ValueError("navigation by a filter leaves no constant navigation errors in the rules")
 
     @property
     def stance(self) -> Stance | None:
@@ -97,6 +106,13 @@ PRESETS: dict[str, Preset] = {
             terrain=PAPER_TERRAIN,
             lidar=RangingLidar(rays=64),
             touchdown=GroundTouchdown(),
+        ),
+        Preset(
+            name="navigated",
+            terrain=PAPER_TERRAIN,
+            lidar=RangingLidar(rays=128),
+            touchdown=GroundTouchdown(),
+            navigation=NavigationSystem(),
         ),
     )
 }

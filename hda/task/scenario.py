@@ -13,6 +13,7 @@ from guidance.arrays import Array
 from guidance.state import State
 from hda.ground.library import FRESH_SPLIT, Ground, load_tile, tile_numbers
 from hda.ground.tile import Tile
+from hda.navigation.sensor_errors import SensorErrors, draw_sensor_errors
 from hda.safety.touchdown_stance import NO_GROUND, Footing, make_footing
 from hda.task.first_target import describe_lack, draw_target, offers_targets
 from hda.task.observation import ScenarioView
@@ -45,8 +46,22 @@ class Scenario:
     left_out: tuple[int, ...] = ()
 
     @property
+    def sensor_errors(self) -> SensorErrors | None:
+        """What errs for the whole episode in the navigation sensors; None on a preset without a filter."""
+        system = self.preset.navigation
+        return None if system is None else draw_sensor_errors(system, self.streams.navigation())
+
+    @property
     def navigation_error(self) -> Array:
-        """Estimated minus true position [m] and velocity [m/s], shape (6,)."""
+        """Estimated minus true position [m] and velocity [m/s], shape (6,), as far as it is constant.
+
+        With a filter it is how far the frame of the policies is off the map, and no velocity: horizontally
+        the error of the first estimate, vertically too where heights are measured.
+        """
+        errors = self.sensor_errors
+        if errors is not None:
+            vertical = 0.0 if self.preset.stance is None else errors.position[2]
+            return np.array([errors.position[0], errors.position[1], vertical, 0.0, 0.0, 0.0])
         rules = self.preset.rules
         sigmas = rules.navigation_position_error, rules.navigation_velocity_error
         return self.streams.navigation_error(*sigmas) if any(sigmas) else np.zeros(6)
@@ -70,12 +85,6 @@ class Scenario:
         if stance is None:
             return NO_GROUND
         return make_footing(self.tile.elevation, stance, float(self.nominal_target[2]))
-
-
-def estimated_state(scenario: Scenario, state: State) -> State:
-    """The state as the lander estimates it: the true one plus the episode's navigation error."""
-    error = scenario.navigation_error
-    return State(state.position + error[:3], state.velocity + error[3:], state.mass)
 
 
 def ground_point(scenario: Scenario, site: Array) -> Array:

@@ -58,7 +58,7 @@ class Comparison(KeepingOptions):
         policies: names of policies; `default` is every one that is not slow and not made for another
             preset, `all` is every one; `package.module:Name` is a policy of your own, checked
             against the contract first.
-        preset: the setting: paper, hard, partial, lidar or lidar-coarse.
+        preset: the setting: paper, hard, partial, lidar, lidar-coarse or navigated.
         study_seed: seed of the study; equal seeds give equal episodes.csv and table.csv.
         split: tile split: validation or fresh to evaluate, tuning for choices.
         terrain: ground of your own in place of the preset's, GeoTIFF or .npy (1 m a cell, row 0 south); the

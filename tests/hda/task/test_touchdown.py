@@ -12,7 +12,7 @@ from hda.task.presets import PRESETS
 
 def test_only_the_presets_that_measure_their_ground_end_on_it():
     for name, preset in PRESETS.items():
-        on_ground = name in ("lidar", "lidar-coarse")
+        on_ground = name in ("lidar", "lidar-coarse", "navigated")
         assert isinstance(preset.touchdown, hda.GroundTouchdown) == on_ground
         assert (preset.stance is not None) == on_ground
     assert hda.sample_scenario("paper", 0, 0).footing is NO_GROUND
@@ -40,7 +40,7 @@ def test_ground_that_no_sensor_measures_is_no_place_to_touch_down():
 @pytest.mark.parametrize("name", ["bearing", "centre_of_mass_height", "moment_of_inertia"])
 def test_a_lander_that_cannot_be_is_refused_by_name(name):
     with pytest.raises(ValueError, match=name):
-        replace(hda.GroundTouchdown(), **{name: math.nan})
+        replace(hda.GroundTouchdown(), **{name: math.nan})  # pyright: ignore[reportArgumentType]
 
 
 @pytest.mark.parametrize("name", ["vertical_speed", "horizontal_speed", "slope"])

@@ -1,0 +1,161 @@
+"""The filter inside the vehicle's inner loop: what it steers by is the estimate of the same instant."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from guidance.arrays import Array, Index
+from guidance.kernel import compile_kernel
+from hda.navigation.control_period import navigate_period, range_down
+from hda.navigation.layout import (
+    ESTIMATED,
+    NORMAL_COLUMNS,
+    POSITION,
+    SENSORS,
+    SITE,
+    SIZE,
+    UNIFORM_COLUMNS,
+    VELOCITY,
+    AidingNumbers,
+    FilterMemory,
+    FilterNumbers,
+    InertialNumbers,
+    TrueErrors,
+)
+
+
+class Sensing(NamedTuple):
+    """A filter at work over one interval; see `FilterMemory`, `TrueErrors` and `FilterNumbers`.
+
+    Attributes:
+        memory: changed in place.
+        errors: the sensors' true errors; the accelerometer's bias is changed in place.
+        normal: shape (n, 16), draws of the interval's control periods. Empty: there is no filter.
+        uniform: shape (n, 3).
+        numbers: sensors and filter.
+        elevation: [m] shape (rows, columns), the true ground at 1 m a cell.
+        top: [m] no ground is higher.
+        site: [m] shape (3,), the landing site in the frame that the vehicle steers in.
+        instant: number of the control instant at which the interval begins.
+    """
+
+    memory: FilterMemory
+    errors: TrueErrors
+    normal: Array
+    uniform: Array
+    numbers: FilterNumbers
+    elevation: NDArray[np.float32]
+    top: float
+    site: Array
+    instant: int
+
+
+_PlainAiding = tuple[float, int, float, float, float, float, float]
+_PlainNumbers = tuple[
+    tuple[float, float, float],
+    _PlainAiding,
+    _PlainAiding,
+    _PlainAiding,
+    Array,
+    float,
+    float,
+    Array,
+    int,
+]
+PlainSensing = tuple[
+    tuple[Array, Array, Index],
+    tuple[Array, float, Array, Array],
+    Array,
+    Array,
+    _PlainNumbers,
+    NDArray[np.float32],
+    float,
+    Array,
+    int,
+]
+"""`Sensing` without names: numba takes plain tuples from Python several times as fast."""
+
+
+@compile_kernel
+def name_sensing(plain: PlainSensing) -> Sensing:
+    """Give a plain tuple its names."""
+    memory, errors, normal, uniform, numbers, elevation, top, site, instant = plain
+    inertial, altimeter, velocimeter, terrain, beams, relief, length, gates, patience = numbers
+    named = FilterNumbers(
+        InertialNumbers(*inertial),
+        AidingNumbers(*altimeter),
+        AidingNumbers(*velocimeter),
+        AidingNumbers(*terrain),
+        beams,
+        relief,
+        length,
+        gates,
+        patience,
+    )
+    return Sensing(
+        FilterMemory(*memory), TrueErrors(*errors), normal, uniform, named, elevation, top, site, instant
+    )
+
+
+def _without_names(sensing: Sensing) -> PlainSensing:
+    numbers = sensing.numbers
+    plain = tuple(tuple(part) if isinstance(part, tuple) else part for part in numbers)
+    return (tuple(sensing.memory), tuple(sensing.errors), *sensing[2:4], plain, *sensing[5:])  # pyright: ignore[reportReturnType]
+
+
+def _no_sensing() -> Sensing:
+    nothing = np.empty((0, 0), dtype=np.float32)
+    nothing.flags.writeable = False
+    off = AidingNumbers(1.0, 0, 0.0, 0.0, 1.0, 0.0, 0.0)
+    numbers = FilterNumbers(
+        InertialNumbers(0.0, 0.0, 1.0), off, off, off, np.zeros((3, 3)), 0.0, 1.0, np.zeros(SENSORS), 1
+    )
+    memory = FilterMemory(np.zeros(ESTIMATED), np.zeros((SIZE, SIZE)), np.zeros(SENSORS, dtype=np.int64))
+    errors = TrueErrors(np.zeros(3), 0.0, np.zeros(3), np.zeros(3))
+    normal, uniform = np.empty((0, NORMAL_COLUMNS)), np.empty((0, UNIFORM_COLUMNS))
+    return Sensing(memory, errors, normal, uniform, numbers, nothing, 0.0, np.zeros(3), 0)
+
+
+NO_SENSING = _no_sensing()
+"""No filter: the error of the estimate stays as it is."""
+
+_PLAIN_NO_SENSING = _without_names(NO_SENSING)
+
+
+def plain_sensing(sensing: Sensing) -> PlainSensing:
+    """Take the names away."""
+    return _PLAIN_NO_SENSING if sensing is NO_SENSING else _without_names(sensing)
+
+
+@compile_kernel
+def sense(
+    sensing: Sensing, flown: tuple[Array, Array, float, int], gravity: Array, estimation_error: Array
+) -> None:
+    """Take the filter over one flown control period, if there is a filter.
+
+    What the vehicle steers by is its estimated place from the estimated site, set down in the frame in which
+    the site stands where the policy put it.
+
+    Args:
+        sensing: the filter; changed in place.
+        flown: true states (x y z vx vy vz m) before and after, the time between [s], and the number of the
+            period in its interval.
+        gravity: [m/s^2] shape (3,).
+        estimation_error: shape (6,), estimated minus true position [m] and velocity [m/s]; written in place.
+    """
+    before, after, time, period = flown
+    if sensing.normal.shape[0] == 0:
+        return
+    height = range_down(sensing.elevation, after[:3], sensing.errors.tilt, sensing.top)
+    truth = (before, after, time, height, sensing.instant + period + 1)
+    draws = (sensing.normal[period], sensing.uniform[period])
+    squares = np.empty(3)
+    navigate_period(sensing.memory, truth, gravity, sensing.errors, draws, sensing.numbers, squares)
+    mean = sensing.memory.mean
+    for axis in range(3):
+        place = mean[POSITION + axis] - mean[SITE + axis] + sensing.site[axis]
+        estimation_error[axis] = place - after[axis]
+        estimation_error[3 + axis] = mean[VELOCITY + axis] - after[3 + axis]
