@@ -41,7 +41,7 @@ pytestmark = pytest.mark.parametrize("name", names())
 @pytest.fixture(scope="module")
 def scenarios() -> list[Scenario]:
     """Twenty starts, by map and by measured looks, half of them on the hard ground or with few rays."""
-    presets = ("paper", "lidar", "hard", "lidar-coarse")
+    presets = ("paper", "lidar", "hard", "lidar-coarse", "navigated")
     return [hda.sample_scenario(presets[k % 4], 17, k) for k in range(20)]
 
 
