@@ -44,7 +44,7 @@ demo: $(VENV)/.installed  ## a first result: 100 episodes, six policies, and the
 bench: $(VENV)/.installed  ## measure the speed of the inner loops
 	$(BIN)/python -m studies.bench $(ARGS)
 
-results: $(VENV)/.installed  ## make every table of docs/results again, what is missing first; hours
+results: $(VENV)/.installed  ## make the tables of docs/results again, what is missing first; hours
 	$(BIN)/python -m studies.results $(ARGS)
 
 results-check: $(VENV)/.installed-dev  ## compare the smaller tables of docs/results with a fresh run

@@ -14,10 +14,9 @@ from typing import Annotated, Any
 import tyro
 
 from guidance.console import one_line_errors, tolerate_encoding
-from rl.inference.artefacts import WEIGHTS_FOLDER, read_card
+from rl.inference.artefacts import ENCODER, WEIGHTS_FOLDER, read_card
+from rl.inference.latent import encoder_names
 from rl.policies.catalogue import entries
-
-ENCODER = "autoencoder"
 
 _HEAD = """# Model cards
 
@@ -57,7 +56,8 @@ def describe_models() -> str:
     """
     summaries = {entry.name: entry.summary for entry in entries()}
     shipped = {name: text for name, text in summaries.items() if (WEIGHTS_FOLDER / f"{name}.json").exists()}
-    parts = [_HEAD, *(_describe_agent(name, text) for name, text in shipped.items()), _describe_encoder()]
+    parts = [_HEAD, *(_describe_agent(name, text) for name, text in shipped.items())]
+    parts += [_describe_encoder(name) for name in encoder_names()]
     return "\n".join(parts)
 
 
@@ -99,12 +99,13 @@ def _describe_seed(seed: dict[str, Any]) -> str:
     return f"| {' | '.join([str(seed['seed']), *ratios, *cost])} |"
 
 
-def _describe_encoder() -> str:
-    card = read_card(WEIGHTS_FOLDER / f"{ENCODER}.json", ENCODER)
+def _describe_encoder(name: str) -> str:
+    card = read_card(WEIGHTS_FOLDER / f"{name}.json", ENCODER)
     left = {split: 100.0 * error["variance_left"] for split, error in card["reconstruction_error"].items()}
     lines = [
-        f"## {ENCODER}\n",
-        f"What all agents see a look through: {card['latent_size']} numbers of 64 x 64 pixels.\n",
+        f"## {name}\n",
+        f"What agents see a look through: {card['latent_size']} numbers of 64 x 64 pixels,"
+        f" learnt on looks of `{card['preset']}`.\n",
         "| | |",
         "|---|---|",
         f"| trained by | `{card['command']}` |",

@@ -7,6 +7,7 @@ from typing import Any, Literal
 
 from rl.environment.action import ActionRanges
 from rl.environment.encoding import CURVED, PRINTED
+from rl.inference.artefacts import ENCODER
 
 AlgorithmName = Literal["td3", "sac", "ddpg", "tqc", "td3-lstm", "td3-lstm-plus"]
 
@@ -82,7 +83,7 @@ class AgentSettings(OffPolicySettings):
 
     algorithm: AlgorithmName = "td3"
     layout: str = CURVED.name
-    encoder: str = "autoencoder"
+    encoder: str = ENCODER
     learning_rate: float = 3e-4
     final_learning_rate: float = 3e-5
     learning_rate_decay: tuple[int, int] = (190_000, 250_000)

@@ -1,7 +1,8 @@
-"""Every table of docs/results made again, in the order of need: `make results`.
+"""The tables of docs/results made again, in the order of need: `make results`.
 
 Each is a command of its own, which keeps finished work and goes on with it. What is finished at the present
-commit is written to a journal and not made again. Stopped, the same call goes on.
+commit is written to a journal and not made again. Stopped, the same call goes on. Left out is what needs
+files or packages that are not shipped: runs of training, models of real ground, other planners.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ from studies.campaign.provenance import git_commit
 from studies.campaign.shards import write_durably
 
 _FINISHED = "finished.json"
+_BEGUN = "begun.json"
 
 
 @dataclass(frozen=True)
@@ -157,7 +159,7 @@ def make_results(options: MakeResults, console: Console) -> list[str]:
             console.print(f"{number}/{len(names)} {name}: finished at this commit")
             continue
         console.print(f"{number}/{len(names)} {name}: python -m {result.command}")
-        words = [*shlex.split(result.command), *(["--resume"] if result.resumable else [])]
+        words = [*shlex.split(result.command), *_keeping(name, folder, commit, options.again)]
         began = time.perf_counter()
         if subprocess.run([sys.executable, "-m", *words], check=False).returncode != 0:
             failed.append(name)
@@ -167,6 +169,17 @@ def make_results(options: MakeResults, console: Console) -> list[str]:
         entries = {name: asdict(entry) for name, entry in finished.items()}
         write_durably(folder / _FINISHED, json.dumps(entries, indent=1).encode())
     return failed
+
+
+def _keeping(name: str, folder: Path, commit: str, again: bool) -> list[str]:
+    """Go on with what the same sources began; replace what others made."""
+    if not RESULTS[name].resumable:
+        return []
+    path = folder / _BEGUN
+    begun = json.loads(path.read_text()) if path.exists() else {}
+    same = bool(commit) and begun.get(name) == commit and not again
+    write_durably(path, json.dumps({**begun, name: commit}, indent=1).encode())
+    return ["--resume"] if same else ["--overwrite"]
 
 
 def _list_results(names: Sequence[str], finished: dict[str, Finished], commit: str) -> Table:

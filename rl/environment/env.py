@@ -23,7 +23,8 @@ from rl.environment.encoding import CURVED, LATENT_BOUND, LAYOUTS, Layout, encod
 from rl.environment.episode_info import describe_episode
 from rl.environment.episode_source import EpisodeSource
 from rl.inference.arrays import Array32
-from rl.inference.latent import ENCODER, LATENT_SIZE, encoder_path, load_encoder
+from rl.inference.artefacts import ENCODER
+from rl.inference.latent import LATENT_SIZE, encoder_path, load_encoder
 
 ObsType = TypeVar("ObsType")
 _DISPERSION_NAMES = tuple(entry.name for entry in fields(Dispersions))

@@ -24,6 +24,9 @@ READABLE_FORMATS = (1, 2)
 """Cards of format 1 do not hold their own checksum."""
 WEIGHTS_FOLDER = Path(__file__).parents[1] / "weights"
 
+ENCODER = "autoencoder"
+"""The encoder of maps with noise; one that learnt on another preset is named `autoencoder-PRESET`."""
+
 Tensors = dict[str, NDArray[Any]]
 
 

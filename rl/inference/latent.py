@@ -8,11 +8,15 @@ from pathlib import Path
 from typing import Any
 
 from guidance.validation import unknown_name
-from rl.inference.artefacts import WEIGHTS_FOLDER, Artefact, ArtefactError, load_artefact, require
+from rl.inference.artefacts import (
+    ENCODER,
+    WEIGHTS_FOLDER,
+    Artefact,
+    ArtefactError,
+    load_artefact,
+    require,
+)
 from rl.inference.networks import MapEncoder
-
-ENCODER = "autoencoder"
-"""The encoder of maps with noise; one that learnt on another preset is named `autoencoder-PRESET`."""
 
 ENCODER_PATH = WEIGHTS_FOLDER / ENCODER
 

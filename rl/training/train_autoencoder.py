@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated
 
 import tyro
 
 from guidance.validation import finite_number
-from rl.inference.artefacts import WEIGHTS_FOLDER
+from rl.inference.artefacts import ENCODER, WEIGHTS_FOLDER
 
 VALIDATION_ROLLOUTS = 300
 _SEED_OFFSET = 770_000
@@ -24,14 +24,21 @@ class TrainAutoencoder:
         preset: setting to fly.
         rollouts: episodes with random actions.
         epochs: passes over their maps.
-        out: where the weights and their card are written (no suffix).
+        out: where the weights and their card are written (no suffix); the shipped encoder of the preset by
+            default: `autoencoder`, or `autoencoder-PRESET` of another than paper.
     """
 
     seed: int = 0
     preset: str = "paper"
     rollouts: int = 5000
     epochs: int = 15
-    out: Annotated[Path, tyro.conf.arg(metavar="PATH")] = field(default=WEIGHTS_FOLDER / "autoencoder")
+    out: Annotated[Path | None, tyro.conf.arg(metavar="PATH")] = None
+
+    @property
+    def weights(self) -> Path:
+        """Where the weights are written."""
+        own = "" if self.preset == TrainAutoencoder.preset else f"-{self.preset}"
+        return self.out or WEIGHTS_FOLDER / f"{ENCODER}{own}"
 
 
 def run_autoencoder_training(options: TrainAutoencoder) -> None:
@@ -89,5 +96,7 @@ def run_autoencoder_training(options: TrainAutoencoder) -> None:
         "reconstruction_error": error,
         "versions": library_versions(),
     }
-    artefact = save_artefact(options.out, "autoencoder", autoencoder.autoencoder_tensors(network), card)
-    Console().print(f"wrote {options.out}.safetensors ({artefact.digest[:12]}); reconstruction error {error}")
+    artefact = save_artefact(options.weights, ENCODER, autoencoder.autoencoder_tensors(network), card)
+    Console().print(
+        f"wrote {options.weights}.safetensors ({artefact.digest[:12]}); reconstruction error {error}"
+    )

@@ -21,9 +21,9 @@ def test_the_page_names_the_command(name: str) -> None:
 
 
 def test_every_page_that_names_a_command_is_made() -> None:
-    """The others need what is not shipped: runs of training, or packages that no extra installs."""
+    """The others need what is not shipped: runs of training, other planners, models of real ground."""
     pages = {path.name for path in PAGES.glob("*.md") if "\n| command |" in path.read_text(encoding="utf-8")}
-    assert pages - {result.page for result in RESULTS.values()} == {"agents.md", "peers.md"}
+    assert pages - {result.page for result in RESULTS.values()} == {"agents.md", "peers.md", "real-ground.md"}
 
 
 @pytest.fixture
@@ -78,3 +78,19 @@ def test_an_unknown_name_is_named() -> None:
 def test_the_list_makes_nothing(small: dict[str, Result], tmp_path: Path) -> None:
     assert make_results(MakeResults(out=tmp_path / "journal", list=True), Console(quiet=True)) == []
     assert not (tmp_path / "journal").exists()
+
+
+@pytest.mark.parametrize(("then", "way"), [("0123abc", "--resume"), ("fedcba0", "--overwrite")])
+def test_begun_work_goes_on_at_the_same_sources_alone(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, then: str, way: str
+) -> None:
+    """The command prints the options that it was given, in place of making anything."""
+    told = tmp_path / "told.txt"
+    script = f"import sys; open({str(told)!r}, 'a').write(' '.join(sys.argv[1:]) + chr(10)); sys.exit(1)"
+    (tmp_path / "told_module.py").write_text(script)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    monkeypatch.setattr(studies.results, "RESULTS", {"any": Result("", "told_module")})
+    for commit in ("0123abc", then):
+        monkeypatch.setattr(studies.results, "git_commit", lambda commit=commit: commit)
+        assert make_results(MakeResults(out=tmp_path / "journal"), Console(quiet=True)) == ["any"]
+    assert told.read_text().split() == ["--overwrite", way]
