@@ -1,7 +1,7 @@
 """Count on the training tiles what the belief assumes: levels of V_P, and safe ground around seen ground.
 
 python -m hda.belief_statistics         counts, and prints them beside what is in use
-python -m hda.belief_statistics --write counts, and writes hda/policies/surroundings.csv
+python -m hda.belief_statistics --write counts, and writes hda/policies/beliefs/surroundings.csv
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from guidance.arrays import Array
 from guidance.console import one_line_errors, tolerate_encoding
 from guidance.validation import finite_number
 from hda.ground.library import Ground, load_tile
-from hda.policies.belief import LEVEL_SHARES, LEVELS
-from hda.policies.surroundings import DISTANCE_EDGES, TABLE, safe_share_table, squared_distance
+from hda.policies.beliefs.belief import LEVEL_SHARES, LEVELS
+from hda.policies.beliefs.surroundings import DISTANCE_EDGES, TABLE, safe_share_table, squared_distance
 from hda.task.presets import PRESETS
 
 LOOKS_PER_TILE = 6
@@ -35,7 +35,7 @@ class BeliefStatistics:
 
     Attributes:
         tiles: training tiles that are counted of each ground, the first ones.
-        write: write hda/policies/surroundings.csv instead of comparing with it.
+        write: write hda/policies/beliefs/surroundings.csv instead of comparing with it.
     """
 
     tiles: int = 40

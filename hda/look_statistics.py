@@ -5,7 +5,7 @@ fused as a belief does it, and every cell whose class the look gave or changed i
 The truth is read where the vehicle believes the cell to be, so the preset may have no navigation errors.
 
 python -m hda.look_statistics         counts, and prints the shares beside those in use
-python -m hda.look_statistics --write counts, and writes hda/policies/measured_readings.json
+python -m hda.look_statistics --write counts, and writes hda/policies/beliefs/measured_readings.json
 """
 
 from __future__ import annotations
@@ -23,9 +23,15 @@ from guidance.console import one_line_errors, tolerate_encoding
 from guidance.validation import finite_number
 from hda.flight.episode import fly
 from hda.flight.record import EpisodeRecord
+from hda.policies.beliefs.measured_belief import MeasuredBelief
+from hda.policies.beliefs.measured_readings import (
+    PROBABILITY_EDGES,
+    SHAPE,
+    ReadingCounts,
+    read_counts,
+    write_counts,
+)
 from hda.policies.hazard_aware import fuse_look
-from hda.policies.measured_belief import MeasuredBelief
-from hda.policies.measured_readings import PROBABILITY_EDGES, SHAPE, ReadingCounts, read_counts, write_counts
 from hda.registry import make_policy
 from hda.sensing.gridding import PIXEL_SIZES
 from hda.sensing.ranging import RangingLidar
@@ -41,7 +47,7 @@ class LookStatistics:
         episodes: flights over training tiles, for each number of rays.
         rays: numbers of rays along each side of a scan.
         preset: whose ground and sensor are used.
-        write: write hda/policies/measured_readings.json instead of comparing with it.
+        write: write hda/policies/beliefs/measured_readings.json instead of comparing with it.
     """
 
     episodes: int = 200
@@ -131,7 +137,7 @@ def main() -> None:
     out(f"{counts.cells.sum()} readings; share of safe ground\n" + describe_shares(counts))
     if options.write:
         write_counts(counts, shlex.join(["python", "-m", "hda.look_statistics", *sys.argv[1:]]))
-        out("wrote hda/policies/measured_readings.json\n")
+        out("wrote hda/policies/beliefs/measured_readings.json\n")
         return
     out("in use\n" + describe_shares(read_counts()))
 

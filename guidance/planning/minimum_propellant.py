@@ -10,10 +10,10 @@ import numpy as np
 from guidance.arrays import Array
 from guidance.convex.clarabel_solver import SolveStatus
 from guidance.convex.programme import ConvexSolution
-from guidance.flight_time.bracket_search import BracketSearch
 from guidance.flight_time.primer_vector import PrimerFlight
 from guidance.flight_time.search import TimeModel, TimeSearch
 from guidance.flight_time.time_window import TimeWindow, guess_time, time_window
+from guidance.planning.bracket_search import BracketSearch
 from guidance.planning.convex_task import MOST_REFINEMENTS, ConvexTask, bounds_hold
 
 _COARSE_NODES = 13

@@ -1,8 +1,8 @@
 """Policies: where to land, and how to fly there.
 
 Each is a site selection with a guidance law (`composition`); `catalogue` lists them for the registry. The
-belief over the ground and the price of a site stand beside the policies that use them. Those that see the
-true map live in `privileged`. A policy knows the task and `guidance`, never the simulator.
+price of a site stands beside the policies that use it; what is believed of the ground lives in `beliefs`, and
+those that see the true map in `privileged`. A policy knows the task and `guidance`, never the simulator.
 """
 
 from typing import TYPE_CHECKING

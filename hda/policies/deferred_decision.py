@@ -21,12 +21,12 @@ from guidance.tracking.regulator import tracking_gains
 from guidance.tracking.soft_landing import SoftLanding, plan_soft_landing, sample_descent
 from guidance.validation import finite_number
 from hda.policies.adjusted_descent import AdjustedDescent
-from hda.policies.belief import GroundBelief
+from hda.policies.beliefs.belief import GroundBelief
+from hda.policies.beliefs.surroundings import infer_unseen
 from hda.policies.hazard_aware import HazardAwareSite, fuse_look
 from hda.policies.landing_dispersion import landing_probability
 from hda.policies.planned_descent import DescentMemory
 from hda.policies.site_price import HazardAwareWeights
-from hda.policies.surroundings import infer_unseen
 from hda.policy import Decision, DecisionStatus, PlanCommand
 from hda.task.observation import Observation, ScenarioView
 

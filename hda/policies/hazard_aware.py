@@ -17,8 +17,9 @@ from guidance.arrays import Array
 from guidance.constants import MOON_GRAVITY
 from guidance.lander import Lander
 from guidance.state import State
-from hda.policies.belief import GroundBelief, SafetyBelief
-from hda.policies.measured_belief import MeasuredBelief
+from hda.policies.beliefs.belief import GroundBelief, SafetyBelief
+from hda.policies.beliefs.measured_belief import MeasuredBelief
+from hda.policies.beliefs.surroundings import infer_unseen
 from hda.policies.site_price import (
     LATTICE,
     HazardAwareWeights,
@@ -26,7 +27,6 @@ from hda.policies.site_price import (
     price_sites,
     propellant_map,
 )
-from hda.policies.surroundings import infer_unseen
 from hda.sensing.gridding import PIXEL_SIZES, ElevationMap, PixelGrid
 from hda.sensing.lidar import Lidar
 from hda.sensing.measured_look import MeasuredGround, assess_elevation

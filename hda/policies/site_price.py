@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from guidance.arrays import Array
 from guidance.two_impulse import divert_cost
 from guidance.validation import finite_number
-from hda.policies.belief import GroundBelief
+from hda.policies.beliefs.belief import GroundBelief
 from hda.policies.cell_prices import (
     Lattice,
     NextLook,

@@ -1,6 +1,6 @@
 """Brute-force Bayes over the levels of a cell: one reading at a time, with scipy's normal distribution.
 
-Nothing here is shared with `hda.policies.belief` but the levels and their shares, its model's assumption.
+Nothing here is shared with `hda.policies.beliefs.belief` but the levels and their shares, its assumption.
 """
 
 import math

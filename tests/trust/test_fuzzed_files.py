@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hda.flight.episode_row import EpisodeRow
-from hda.policies.surroundings import safe_share_table
+from hda.policies.beliefs.surroundings import safe_share_table
 from rl.inference.artefacts import ArtefactError, card_digest, load_artefact, save_artefact
 from rl.policies.actor import load_actor
 from rl.training.run_folder import read_rows, read_run

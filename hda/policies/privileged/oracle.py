@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hda.ground.tile import Tile
-from hda.policies.surroundings import squared_distance
+from hda.policies.beliefs.surroundings import squared_distance
 from hda.safety.touchdown_stance import NO_GROUND, Footing, set_down
 from hda.site_selection import Site
 from hda.task.observation import Observation, ScenarioView

@@ -15,7 +15,7 @@ import hda
 from guidance import State
 from guidance.two_impulse import divert_cost
 from hda.flight.episode import begin_flight, fly, observe
-from hda.policies.belief import SafetyBelief
+from hda.policies.beliefs.belief import SafetyBelief
 from hda.policies.hazard_aware import HazardAwareMemory, HazardAwareSite
 from hda.policies.landing_dispersion import landing_probability
 from hda.policies.site_price import (

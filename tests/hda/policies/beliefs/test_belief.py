@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from guidance import State
 from hda.belief_statistics import level_shares
 from hda.ground.library import Ground, load_tile
-from hda.policies.belief import LEVEL_SHARES, LEVELS, SafetyBelief
+from hda.policies.beliefs.belief import LEVEL_SHARES, LEVELS, SafetyBelief
 from hda.sensing.lidar import Lidar, look
 from hda.task.observation import Observation
 from hda.task.presets import PRESETS

@@ -7,9 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from timed_costs import Sample, hyperbola
 
-from guidance.flight_time.bracket_search import BracketSearch
 from guidance.flight_time.search import TimeModel
 from guidance.flight_time.time_window import TimeWindow
+from guidance.planning.bracket_search import BracketSearch
 
 TOLERANCE = 1e-4
 

@@ -9,10 +9,9 @@ import hda
 from hda.flight.episode import fly
 from hda.flight.record import EpisodeRecord
 from hda.look_statistics import LookStatistics, count_readings, count_record
-from hda.policies.belief import LEVEL_SHARES, LEVELS
-from hda.policies.hazard_aware import fuse_look
-from hda.policies.measured_belief import MeasuredBelief, classify_readings
-from hda.policies.measured_readings import (
+from hda.policies.beliefs.belief import LEVEL_SHARES, LEVELS
+from hda.policies.beliefs.measured_belief import MeasuredBelief, classify_readings
+from hda.policies.beliefs.measured_readings import (
     DENSITY_EDGES,
     HOLE,
     PROBABILITY_EDGES,
@@ -22,6 +21,7 @@ from hda.policies.measured_readings import (
     safe_shares,
     write_counts,
 )
+from hda.policies.hazard_aware import fuse_look
 from hda.safety.criteria import SafetyCriteria
 from hda.sensing.gridding import PIXEL_SIZES, ElevationMap, PixelGrid
 from hda.sensing.measured_look import MeasuredGround, assess_elevation
@@ -225,7 +225,7 @@ def test_the_counts_name_their_command_and_rise_with_the_reading(tmp_path):
     assert (np.diff(fine) > -0.01).all()
     assert fine[-1] > 0.97
     assert fine[0] < 0.01
-    from hda.policies.measured_readings import TABLE
+    from hda.policies.beliefs.measured_readings import TABLE
 
     assert '"command": "python -m hda.look_statistics' in TABLE.read_text()
     write_counts(counts, "python -m hda.look_statistics", tmp_path / "counts.json")

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from guidance.arrays import Array
-from hda.policies.map_readings import CellReadings, fuse_into
+from hda.policies.beliefs.map_readings import CellReadings, fuse_into
 from hda.sensing.lidar import Lidar
 from hda.task.observation import Observation
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from hda.belief_statistics import LOOK_WIDTHS
 from hda.ground.library import Ground, load_tile
-from hda.policies.surroundings import (
+from hda.policies.beliefs.surroundings import (
     DISTANCE_EDGES,
     LARGEST_DISTANCE,
     infer_unseen,

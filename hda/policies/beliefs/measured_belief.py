@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from guidance.arrays import Array
-from hda.policies.belief import LEVEL_SHARES, LEVELS, CellSquare
-from hda.policies.measured_readings import DENSITY_EDGES, HOLE, PROBABILITY_EDGES, safe_shares
+from hda.policies.beliefs.belief import LEVEL_SHARES, LEVELS, CellSquare
+from hda.policies.beliefs.measured_readings import DENSITY_EDGES, HOLE, PROBABILITY_EDGES, safe_shares
 from hda.safety.criteria import SafetyCriteria
 from hda.sensing.fusion import fuse_elevations
 from hda.sensing.gridding import PIXEL_SIZES, ElevationMap
