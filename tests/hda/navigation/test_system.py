@@ -194,7 +194,7 @@ def test_a_sensor_is_read_at_whole_numbers_of_control_periods():
         with pytest.raises(ValueError, match="interval of Altimeter must be a whole number"):
             SYSTEM.numbers(period)
     rules = replace(PRESETS["paper"].rules, control_period=1.0)
-    with pytest.raises(ValueError, match="got 0.5 s for 1 s"):
+    with pytest.raises(ValueError, match=r"got 0\.5 s for 1 s"):
         replace(PRESETS["navigated"], rules=rules)
 
 
