@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from hda.flight.outcome import Ending, Outcome
     from hda.flight.record import EpisodeRecord
     from hda.flight.touchdown_report import TouchdownFault, TouchdownReport
-    from hda.flight.vehicle import FlightErrors, FlightStatus, Segment, fly_interval, fly_over
+    from hda.flight.vehicle import FlightErrors, FlightStatus, Segment, fly_over
 
 _HOMES = {
     "hda.flight.episode": (
@@ -41,7 +41,6 @@ _HOMES = {
         "FlightErrors",
         "FlightStatus",
         "Segment",
-        "fly_interval",
         "fly_over",
     ),
 }
@@ -59,7 +58,6 @@ __all__ = [
     "advance",
     "begin_flight",
     "fly",
-    "fly_interval",
     "fly_legs",
     "fly_over",
     "observe",

@@ -45,7 +45,8 @@ class TouchdownReport:
 
     Attributes:
         slope: [rad] angle of the plane from horizontal.
-        roughness: [m] greatest distance of the ground between the pads above the plane.
+        roughness: [m] greatest distance of the ground between the pads above the plane; -inf where none of it
+            is known.
         vertical_speed: [m/s] square to the plane.
         horizontal_speed: [m/s] along it.
         tip_over_speed: [m/s] along the plane, above which the lander may tip over.

@@ -106,18 +106,6 @@ class Segment:
         return State(self.path[-1, :3], self.path[-1, 3:6], float(self.path[-1, 6]))
 
 
-def fly_interval(
-    state: State,
-    decision: Decision,
-    lander: Lander,
-    gravity: Array,
-    interval: ControlPeriods,
-    errors: FlightErrors,
-) -> Segment:
-    """Fly a decision until the next look or the plane of its site; arguments as of `fly_over`."""
-    return fly_over(state, decision, lander, Surroundings(gravity), interval, errors)
-
-
 def fly_over(
     state: State,
     decision: Decision,
@@ -144,14 +132,7 @@ def fly_over(
     """
     periods = interval.count
     time, path, commanded = np.empty(periods + 2), np.empty((periods + 2, 7)), np.empty((periods + 1, 3))
-    vehicle = (
-        lander.min_thrust,
-        lander.max_thrust,
-        lander.exhaust_velocity,
-        lander.dry_mass,
-        pointing_angle(lander),
-    )
-    plane = float(decision.site[2])
+    plane, vehicle = float(decision.site[2]), _vehicle_limits(lander)
     gravity, ground = surroundings.gravity, surroundings.footing
     footing = (ground.elevation, ground.pads, ground.pad_radius, ground.clearance, ground.plane)
     believed, sensing = errors.navigation.copy(), plain_sensing(errors.sensing)
@@ -179,6 +160,12 @@ def fly_over(
         status=FlightStatus(status),
         pointing_limited=limited,
     )
+
+
+def _vehicle_limits(lander: Lander) -> tuple[float, float, float, float, float]:
+    """`VehicleLimits` without names."""
+    bounds = lander.min_thrust, lander.max_thrust
+    return (*bounds, lander.exhaust_velocity, lander.dry_mass, pointing_angle(lander))
 
 
 def _check_period(planned: float, flown: float) -> None:

@@ -42,7 +42,8 @@ SPLITS: dict[str, range] = {
 only."""
 
 FRESH_SPLIT = "fresh"
-"""Episode k of a study flies over the k-th of its tiles, so that up to 5000 episodes are independent."""
+"""Episode k of a study flies over the k-th of its tiles, so that up to 5000 episodes are independent, but for
+those whose tile has no first target and is passed over for another's."""
 
 _LAYERS = {
     "elevation": np.float32,
@@ -187,13 +188,13 @@ def _build_in_memory(ground: Ground, number: int) -> Tile:
 @lru_cache(maxsize=96)
 def _open_or_build(ground: Ground, number: int) -> Tile:
     folder = _tile_folder(ground, number)
-    tile = _read(folder, number)
+    tile = _read(folder, ground, number)
     if tile is not None:
         return tile
     shutil.rmtree(folder, ignore_errors=True)
     built = build_tile(ground, number)
     _store(ground, built)
-    return _read(folder, number) or built
+    return _read(folder, ground, number) or built
 
 
 def _store(ground: Ground, tile: Tile) -> None:
@@ -223,11 +224,22 @@ def _write(folder: Path, tile: Tile) -> None:
     (folder / "checksums.json").write_text(json.dumps(sums, sort_keys=True))
 
 
-def _read(folder: Path, number: int) -> Tile | None:
-    """Map a stored tile; None where there is none or it is damaged. Checksums are tested once per process."""
+def _layers(ground: Ground) -> set[str]:
+    """Names of the layers that a tile of this ground has."""
+    bare = not isinstance(ground.terrain, OwnTerrain) or ground.terrain.detail is None
+    return set(_LAYERS) - {"added"} if bare else set(_LAYERS)
+
+
+def _read(folder: Path, ground: Ground, number: int) -> Tile | None:
+    """Map a stored tile; None where there is none, a layer lacks or is damaged.
+
+    Checksums are tested once per process.
+    """
     layers = {}
     with suppress(Exception):  # a damaged header makes numpy raise errors of many kinds (EOF, token, syntax)
         sums = json.loads((folder / "checksums.json").read_text())
+        if set(sums) != _layers(ground):
+            return None
         for name in sums:
             kind = _LAYERS[name]
             layer = np.load(folder / f"{name}.npy", mmap_mode="r", allow_pickle=False).view(np.ndarray)

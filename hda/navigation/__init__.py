@@ -3,8 +3,9 @@
 `sensors` and `system` say what is aboard, `sensor_errors` what chance does to it. `navigation_state` is what
 the filter knows, `filter` takes it along a flight, `site_tracking` puts the landing site into it. The other
 modules are their kernels: `layout` names the numbers, `propagation` is the inertial unit, `readings` and
-`site_fixes` are the other sensors, `schmidt_update` takes a measurement in, `control_period` is what the
-vehicle calls. It sees the ground by `hda.sensing`; the task and the simulator import it.
+`site_fixes` are the other sensors, `schmidt_update` takes a measurement in, `control_period` takes the filter
+over one period or along a path, `steering` calls it in the vehicle's loop. It sees the ground by
+`hda.sensing`; the task and the simulator import it.
 """
 
 from typing import TYPE_CHECKING

@@ -58,6 +58,7 @@ def navigate(
     flown: tuple[Array, Array, Array],
     draws: ReadingDraws,
     gravity: ArrayLike = MOON_GRAVITY,
+    control_period: float | None = None,
 ) -> tuple[NavigationState, NavigationLog]:
     """Take the filter along a flown path.
 
@@ -66,14 +67,17 @@ def navigate(
         navigation: the filter at the path's first node.
         flown: times of n control instants [s] shape (n,), true states there (x y z vx vy vz m) shape (n, 7),
             and ranges down [m] at the nodes after the first, shape (n - 1,), NaN where there is no ground.
+            Instants are one control period apart; the last may come at another time, where the flight ends.
         draws: for at least n - 1 periods.
         gravity: [m/s^2] shape (3,).
+        control_period: [s]; the path's first interval if left out.
 
     Returns:
         The filter at the path's last node, and what it went through.
 
     Raises:
-        ValueError: the shapes do not fit one another, or there are too few draws.
+        ValueError: the shapes do not fit one another, there are too few draws, the intervals but the last are
+            not the control period, or a sensor is not read at a whole number of periods.
     """
     time, path, heights = flown
     periods = time.size - 1
@@ -81,6 +85,9 @@ def navigate(
         raise ValueError(f"flown: shapes {time.shape}, {path.shape} and {heights.shape} do not fit together")
     if draws.normal.shape[0] < periods:
         raise ValueError(f"draws must be for {periods} periods, got {draws.normal.shape[0]}")
+    period = float(time[1] - time[0]) if control_period is None else control_period
+    if np.abs(np.diff(time)[:-1] - period).max(initial=0.0) > 1e-6 * period:
+        raise ValueError(f"flown: all intervals but the last must be of one control period, {period:g} s")
     memory, before = navigation.memory(), navigation.errors
     errors = TrueErrors(
         before.accelerometer_bias.copy(), before.altimeter_bias, before.beam_bias, before.tilt
@@ -94,7 +101,7 @@ def navigate(
         finite_vector("gravity", gravity, 3),
         errors,
         (draws.normal, draws.uniform),
-        system.numbers(float(time[1] - time[0])),
+        system.numbers(period),
         (log.estimate, log.covariance, log.innovation_square),
     )
     after = replace(before, accelerometer_bias=errors.accelerometer_bias)

@@ -118,8 +118,9 @@ def carry(
 ) -> None:
     """Carry estimate and covariance over `time` [s] by the measured changes of velocity and position.
 
-    The ground under the beam is a random walk: over a horizontal path d its variance grows by
-    2 s^2 (1 - exp(-d/L)), the variogram of relief of deviation s and correlation length L.
+    The ground under the beam is a random walk: a horizontal path d within this period adds to its variance
+    2 s^2 (1 - exp(-d/L)), the variogram of relief of deviation s and correlation length L. Each period adds
+    its own, so the variance goes on growing with the path, past the 2 s^2 at which the variogram levels off.
     """
     gained, moved = measured
     mean, covariance, _ = memory

@@ -17,6 +17,8 @@ from guidance.arrays import Array
 from guidance.kernel import compile_kernel
 from hda.navigation.layout import ESTIMATED, FilterMemory
 
+_MOST_DOUBTS = 32  # a factor of 2^32: a state that no such doubt opens is not seen at all
+
 
 @compile_kernel
 def _factor(matrix: Array) -> None:
@@ -133,8 +135,9 @@ def take_in(
 ) -> float:
     """Take a measurement in; after too many rejections in a row doubt the estimate and not the sensor.
 
-    The doubt is a variance, the innovation's own square, that is added to the states which the sensor sees.
-    It lets this reading through the gate, so that the filter never goes on alone for good.
+    The doubt is a variance, first the innovation's own square, that is added to the states which the sensor
+    sees, and doubled until the gate lets this reading through: the filter never goes on alone for good. A
+    single addition does not suffice where the sensor sees a state at a narrow angle, as close beams do.
 
     Args:
         memory: of the filter; changed in place.
@@ -157,8 +160,11 @@ def take_in(
         doubt = 0.0
         for a in range(innovation.size):
             doubt += innovation[a] * innovation[a]
-        for i in range(first, last):
-            memory.covariance[i, i] += doubt
-        if update(memory, design, innovation, noise, gate) <= gate:
-            memory.rejections[sensor] = 0
+        for _ in range(_MOST_DOUBTS):
+            for i in range(first, last):
+                memory.covariance[i, i] += doubt
+            if update(memory, design, innovation, noise, gate) <= gate:
+                memory.rejections[sensor] = 0
+                break
+            doubt *= 2.0
     return square

@@ -198,11 +198,21 @@ class SiteFixes:
 
 
 def aiding_numbers(sensor: Altimeter | Velocimeter | TerrainFixes | None, period: float) -> AidingNumbers:
-    """A sensor for the kernels of a vehicle that steers each `period` [s]; None: it is not there."""
+    """A sensor for the kernels of a vehicle that steers each `period` [s]; None: it is not there.
+
+    Raises:
+        ValueError: the sensor's interval is not a whole number of periods.
+    """
     if sensor is None:
         return AidingNumbers(1.0, 0, 0.0, 0.0, 1.0, 0.0, 0.0)
     plume = (0.0, 0.0)
     if not isinstance(sensor, TerrainFixes):
         plume = (sensor.plume_height, sensor.plume_noise)
-    every = max(1, round(sensor.interval / period))
+    ratio = sensor.interval / period
+    every = round(ratio)
+    if every < 1 or abs(ratio - every) > 1e-6 * ratio:
+        raise ValueError(
+            f"interval of {type(sensor).__name__} must be a whole number of control periods,"
+            f" got {sensor.interval:g} s for {period:g} s"
+        )
     return AidingNumbers(sensor.noise, every, sensor.floor, sensor.ceiling, sensor.dropout, *plume)

@@ -57,12 +57,12 @@ def track_site(
         return navigation, float("nan")
     deviation = fixes.deviation(slant)
     reading = measure_site(site - position, navigation.errors.tilt, deviation, draws.normal)
-    memory, numbers = navigation.memory(), system.numbers(1.0)
-    square = fix_site(memory, reading, deviation, numbers.gates[SITE_FIX], numbers.patience)
+    memory, gate = navigation.memory(), float(system.gates[SITE_FIX])
+    square = fix_site(memory, reading, deviation, gate, system.patience)
     return _close(navigation, memory), float(square)
 
 
-def choose_site(navigation: NavigationState, offset: ArrayLike, deviation: float = 0.0) -> NavigationState:
+def choose_site(navigation: NavigationState, offset: ArrayLike) -> NavigationState:
     """Change the tracked site for another on the map that the looks made.
 
     The map hangs on the old site, so the new one takes over its error.
@@ -70,15 +70,12 @@ def choose_site(navigation: NavigationState, offset: ArrayLike, deviation: float
     Args:
         navigation: the filter.
         offset: [m] shape (3,), new less old site on the map.
-        deviation: [m] one sigma, along each axis, of the map's error over this distance.
 
     Raises:
         ValueError: the offset is not three finite numbers.
     """
     memory = navigation.memory()
     memory.mean[SITE : SITE + 3] += finite_vector("offset", offset, 3)
-    for axis in range(SITE, SITE + 3):
-        memory.covariance[axis, axis] += deviation**2
     return _close(navigation, memory)
 
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.special import chdtri
 
+from guidance.arrays import Array
 from guidance.validation import finite_number, unknown_name
 from hda.navigation.layout import FilterNumbers
 from hda.navigation.sensors import (
@@ -22,6 +23,7 @@ from hda.navigation.sensors import (
     aiding_numbers,
 )
 
+_LOST_BELOW = 100.0  # [m] above the ground, `altimeter-lost-low`
 _NO_VELOCIMETER = Velocimeter()  # its beams stand in the kernels' numbers; they are never read
 
 
@@ -74,9 +76,18 @@ class NavigationSystem:
         if self.patience < 1:
             raise ValueError(f"patience must be at least 1, got {self.patience}")
 
-    def numbers(self, period: float) -> FilterNumbers:
-        """The system for the kernels of a vehicle that steers each `period` [s]."""
+    @property
+    def gates(self) -> Array:
+        """Greatest squared innovation that each sensor's gate lets through, shape (4,)."""
         freedom = np.array([1.0, 3.0, 3.0, 3.0])  # ALTIMETER, VELOCIMETER, TERRAIN_FIX, SITE_FIX
+        return np.array(chdtri(freedom, self.false_rejections))
+
+    def numbers(self, period: float) -> FilterNumbers:
+        """The system for the kernels of a vehicle that steers each `period` [s].
+
+        Raises:
+            ValueError: a sensor's interval is not a whole number of periods.
+        """
         return FilterNumbers(
             inertial=self.inertial.numbers,
             altimeter=aiding_numbers(self.altimeter, period),
@@ -85,15 +96,16 @@ class NavigationSystem:
             beams=(self.velocimeter or _NO_VELOCIMETER).beams,
             relief=self.relief,
             relief_length=self.relief_length,
-            gates=np.array(chdtri(freedom, self.false_rejections)),
+            gates=self.gates,
             patience=self.patience,
         )
 
 
 def _raise_floor(system: NavigationSystem) -> NavigationSystem:
-    if system.altimeter is None:
-        return system
-    return replace(system, altimeter=replace(system.altimeter, floor=max(100.0, system.altimeter.floor)))
+    altimeter = system.altimeter
+    if altimeter is None or altimeter.ceiling < _LOST_BELOW:
+        return replace(system, altimeter=None)
+    return replace(system, altimeter=replace(altimeter, floor=max(_LOST_BELOW, altimeter.floor)))
 
 
 def _drop_looks(system: NavigationSystem) -> NavigationSystem:

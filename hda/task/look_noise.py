@@ -1,7 +1,7 @@
 """Standard normal noise from a seed, in compiled code: numpy's own streams, to the bit.
 
-What `Generator(PCG64(SeedSequence(...))).standard_normal(dtype=float32)` draws, in a third of its time: the
-hash of the seed, the generator and the ziggurat run in one kernel. numpy is the oracle in the tests.
+What `Generator(PCG64(SeedSequence(...))).standard_normal(dtype=float32)` draws: the hash of the
+seed, the generator and the ziggurat run in one kernel. numpy is the oracle in the tests.
 
 Sources: O'Neill, "PCG", HMC-CS-2014-0905 (128 bits, XSL RR); Marsaglia and Tsang, Journal of Statistical
 Software 5(8), 2000 (ziggurat), as numpy states them.

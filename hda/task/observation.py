@@ -63,7 +63,7 @@ class Observation:
     Attributes:
         index: number of the decision, from 0.
         time: [s] since the start.
-        state: estimated position, velocity and mass.
+        state: estimated position and velocity, and the true mass: no preset errs in what has been burnt.
         target: [m] shape (3,), current target: the centre of the look. Where flights end on real ground its
             height is the newest that was measured there.
         safety_map: shape (n, n), observed probability of safety, row i grows north, column j east. Of a

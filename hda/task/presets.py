@@ -48,8 +48,8 @@ class Preset:
 
     Raises:
         ValueError: gravity does not point down, a start has no propellant or lies below the target plane,
-            flights end on real ground whose height no sensor measures, or there are both a filter and
-            constant errors.
+            flights end on real ground whose height no sensor measures, there are both a filter and constant
+            errors, or a navigation sensor is not read at a whole number of control periods.
     """
 
     name: str
@@ -74,6 +74,8 @@ class Preset:
         constant = self.rules.navigation_position_error, self.rules.navigation_velocity_error
         if self.navigation is not None and any(constant):
             raise ValueError("navigation by a filter leaves no constant navigation errors in the rules")
+        if self.navigation is not None:
+            self.navigation.numbers(self.rules.control_period)  # refuses a sensor that no instant can read
 
     @property
     def stance(self) -> Stance | None:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from guidance.arrays import Array
 from hda.navigation.sensor_errors import FixDraws, ReadingDraws, draw_fix, draw_readings
-from hda.sensing.ranging import ScanDraws, draw_scan
+from hda.sensing.scan_draws import ScanDraws, draw_scan
 from hda.task.look_noise import POOL, draw_normals
 
 _SCENARIO, _SENSOR, _ACTUATOR, _POLICY, _NAVIGATION = range(5)

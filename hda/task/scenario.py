@@ -99,6 +99,11 @@ def ground_point(scenario: Scenario, site: Array) -> Array:
     return site - np.array([error[0], error[1], vertical])
 
 
+def frame_point(scenario: Scenario, point: Array) -> Array:
+    """[m] shape (3,), a true point in the frame of the estimated position: the inverse of `ground_point`."""
+    return point - ground_point(scenario, np.zeros(3))
+
+
 def true_heights(scenario: Scenario, rows: NDArray[np.int_], columns: NDArray[np.int_]) -> Array:
     """[m] shape (n,), where a landing on each cell ends: on the target plane, or on the true ground."""
     if scenario.preset.stance is None:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from guidance import MOON_GRAVITY, Lander, State, zem_zev_acceleration
-from hda.flight.vehicle import ControlPeriods, FlightErrors, FlightStatus, fly_interval
+from hda.flight.vehicle import ControlPeriods, FlightErrors, FlightStatus, Surroundings, fly_over
 from hda.policy import Decision, DecisionStatus, ZemZevCommand
 from hda.task.presets import PRESETS
 from studies.campaign.claimed_folder import FolderError
@@ -197,11 +197,11 @@ def test_sampled_flight_against_the_vehicle(gains: Gains, time: float) -> None:
     clock = Clock.of(time, PERIOD)
     ours = fly_sampled(gains, clock, position, velocity, gravity)
     command = ZemZevCommand(gains.position, gains.velocity, time)
-    flown = fly_interval(
+    flown = fly_over(
         State(position, velocity, 1000.0),
         Decision(site, command, DecisionStatus.NOMINAL),
         lander,
-        gravity,
+        Surroundings(gravity),
         ControlPeriods(PERIOD, clock.periods),
         FlightErrors(),
     )
@@ -224,11 +224,11 @@ def test_mean_descent_touches_down_as_the_vehicle_does(gains: Gains) -> None:
         clock = Clock.of(time + shift, PERIOD)
         ours = fly_sampled(gains, clock, position, velocity, gravity)
         command = ZemZevCommand(gains.position, gains.velocity, time + shift)
-        flown = fly_interval(
+        flown = fly_over(
             State(position, velocity, 1200.0),
             Decision(np.zeros(3), command, DecisionStatus.NOMINAL),
             preset.lander,
-            gravity,
+            Surroundings(gravity),
             ControlPeriods(PERIOD, clock.periods + 1),
             FlightErrors(),
         )

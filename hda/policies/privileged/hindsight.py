@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from hda.policies.privileged.knowable_ground import KnowableGround, first_ground, nearest_known_site
+from hda.policies.privileged.oracle import frame_offset
 from hda.policies.privileged.oracle_fuel import CheapestSafeSite
 from hda.site_selection import Site
 from hda.task.observation import Observation, ScenarioView
@@ -28,10 +29,11 @@ class BestKnownSite(CheapestSafeSite):
     @classmethod
     def informed(cls, truth: Scenario) -> BestKnownSite:
         """Make the selection that knows the tile of this scenario, and its knowable ground."""
-        return cls(truth.tile, footing=truth.footing, ground=first_ground(truth))
+        offset = frame_offset(truth)
+        return cls(truth.tile, footing=truth.footing, offset=offset, ground=first_ground(truth))
 
     def choose(self, observation: Observation, view: ScenarioView) -> Site:
-        """The first target where nothing could have been known."""
+        """The first target where nothing could have been known; all is told by the map."""
         site = super().choose(observation, view)
         if self.ground.contains(site):
             return site

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from guidance.arrays import Array
+from guidance.state import State
 from hda.ground.tile import Tile
 from hda.policies.beliefs.surroundings import squared_distance
 from hda.safety.touchdown_stance import NO_GROUND, Footing, set_down
 from hda.site_selection import Site
 from hda.task.observation import Observation, ScenarioView
-from hda.task.scenario import Scenario
+from hda.task.scenario import Scenario, frame_point
+
+ON_MAP = np.zeros(3)
+"""Frame of policies that is the map's own."""
 
 
 @lru_cache(maxsize=32)
@@ -41,6 +46,21 @@ def nearest_clear_site(tile: Tile, target: Site, clearance: float) -> Site:
     return np.array([columns[best] + 0.5, rows[best] + 0.5, target[2]])
 
 
+def frame_offset(truth: Scenario) -> Array:
+    """[m] shape (3,), by which the policies' frame stands off the map where a filter makes that frame.
+
+    It is zero without a filter: the constant error of `partial` is one that no policy is told, these neither.
+    """
+    return ON_MAP if truth.preset.navigation is None else frame_point(truth, np.zeros(3))
+
+
+def put_on_map(observation: Observation, offset: Array) -> Observation:
+    """An observation whose state and target are told by the map: taken back by the frame's offset [m]."""
+    seen = observation.state
+    state = State(seen.position - offset, seen.velocity, seen.mass)
+    return replace(observation, state=state, target=observation.target - offset)
+
+
 @dataclass(frozen=True, eq=False)
 class OracleSite:
     """Privileged: the truly safe cell nearest to the first target with some clearance.
@@ -49,16 +69,18 @@ class OracleSite:
         truth: the tile that is being flown.
         clearance: [m] of safe ground around the site.
         footing: the lander over the true ground, for the height of the site; none on the target plane.
+        offset: [m] shape (3,), of the frame that sites are given in from the map.
     """
 
     truth: Tile = field(repr=False)
     clearance: float = 2.0
     footing: Footing = field(default=NO_GROUND, repr=False)
+    offset: Array = field(default_factory=lambda: ON_MAP, repr=False)
 
     @classmethod
     def informed(cls, truth: Scenario) -> OracleSite:
         """Make the selection that knows the tile of this scenario."""
-        return cls(truth.tile, footing=truth.footing)
+        return cls(truth.tile, footing=truth.footing, offset=frame_offset(truth))
 
     def begin(self, view: ScenarioView) -> None:
         """No site yet."""
@@ -66,6 +88,6 @@ class OracleSite:
     def select(self, observation: Observation, memory: Site | None) -> tuple[Site, Site]:
         """Choose once, then stay."""
         if memory is None:
-            site = nearest_clear_site(self.truth, observation.target, self.clearance)
-            memory = set_down(self.footing, site)
+            site = nearest_clear_site(self.truth, observation.target - self.offset, self.clearance)
+            memory = set_down(self.footing, site) + self.offset
         return memory, memory

@@ -10,7 +10,7 @@ from guidance.arrays import Array
 from guidance.two_impulse import divert_cost
 from hda.ground.tile import Tile
 from hda.policies.hazard_aware import load_kernels
-from hda.policies.privileged.oracle import safe_clearance
+from hda.policies.privileged.oracle import ON_MAP, frame_offset, put_on_map, safe_clearance
 from hda.safety.touchdown_stance import NO_GROUND, Footing, set_down
 from hda.sensing.ranging import RangingLidar
 from hda.site_selection import Site
@@ -25,7 +25,8 @@ def cheapest_clear_site(tile: Tile, observation: Observation, view: ScenarioView
 
     Where no cell has that much, of those with most the cheapest is given. Blocks of ground are searched from
     the cheapest middle on, until none that is left can hold a cheaper cell: propellant bends over hundreds of
-    metres, so within a block it falls by little more than the steepest step between two middles.
+    metres, so within a block it falls by little more than the steepest step between two middles. Observation
+    and site are told by the map.
     """
     room = safe_clearance(tile)
     clear = room >= min(clearance, float(room.max()))
@@ -66,16 +67,18 @@ class CheapestSafeSite:
         truth: the tile that is being flown.
         clearance: [m] of safe ground around the site.
         footing: the lander over the true ground, for the height of the site; none on the target plane.
+        offset: [m] shape (3,), of the frame that sites are given in from the map.
     """
 
     truth: Tile = field(repr=False)
     clearance: float = 2.0
     footing: Footing = field(default=NO_GROUND, repr=False)
+    offset: Array = field(default_factory=lambda: ON_MAP, repr=False)
 
     @classmethod
     def informed(cls, truth: Scenario) -> CheapestSafeSite:
         """Make the selection that knows the tile of this scenario."""
-        return cls(truth.tile, footing=truth.footing)
+        return cls(truth.tile, footing=truth.footing, offset=frame_offset(truth))
 
     def begin(self, view: ScenarioView) -> tuple[ScenarioView, Site | None]:
         """No site yet; the map of clearances is made here, once per tile."""
@@ -89,9 +92,10 @@ class CheapestSafeSite:
         """Choose at the first look, then stay."""
         view, site = memory
         if site is None:
-            site = set_down(self.footing, self.choose(observation, view))
+            chosen = self.choose(put_on_map(observation, self.offset), view)
+            site = set_down(self.footing, chosen) + self.offset
         return site, (view, site)
 
     def choose(self, observation: Observation, view: ScenarioView) -> Site:
-        """The cheapest site, from the first look's state."""
+        """The cheapest site, from the first look's state; observation and site are told by the map."""
         return cheapest_clear_site(self.truth, observation, view, self.clearance)

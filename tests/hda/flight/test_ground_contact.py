@@ -11,14 +11,7 @@ from hypothesis import strategies as st
 from guidance import MOON_GRAVITY, PAPER_LANDER, State
 from guidance.dynamics import propagate_into
 from hda.flight.ground_contact import Motion, fall_to_ground, hold_over_ground
-from hda.flight.vehicle import (
-    ControlPeriods,
-    FlightErrors,
-    FlightStatus,
-    Surroundings,
-    fly_interval,
-    fly_over,
-)
+from hda.flight.vehicle import ControlPeriods, FlightErrors, FlightStatus, Surroundings, fly_over
 from hda.policy import Decision, ZemZevCommand
 from hda.safety.criteria import DEFAULT_CRITERIA
 from hda.safety.touchdown_stance import Footing, Stance, contact_height, make_footing
@@ -80,7 +73,7 @@ def test_flat_ground_at_the_sites_height_is_the_plane(seed):
     )
     command = ZemZevCommand(rng.uniform(5.0, 7.0), rng.uniform(1.0, 3.0), rng.uniform(0.3, 15.0))
     decision, errors = Decision(site, command), FlightErrors(rng.uniform(-0.05, 0.05))
-    plane = fly_interval(state, decision, PAPER_LANDER, GRAVITY, INTERVAL, errors)
+    plane = fly_over(state, decision, PAPER_LANDER, Surroundings(GRAVITY), INTERVAL, errors)
     ground = fly_over(state, decision, PAPER_LANDER, Surroundings(GRAVITY, WIDE), INTERVAL, errors)
     assert ground.status is plane.status
     np.testing.assert_allclose(ground.time, plane.time, rtol=1e-9, atol=1e-8)

@@ -60,7 +60,7 @@ def test_a_flight_ends_where_the_lander_touches_the_true_ground(scenarios, recor
 
 
 def test_the_height_of_the_ground_is_known_better_the_later_it_is_measured(scenarios, records):
-    """On 12 flights: within 0.6 m at the first look, and at the last within 0.2 m in the median."""
+    """In the median of 12 flights: within 1 m at the first look, and within 0.2 m at the last."""
     first, last = [], []
     for scenario, record in zip(scenarios, records, strict=True):
         errors = [

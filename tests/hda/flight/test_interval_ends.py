@@ -18,7 +18,7 @@ from guidance.lander import PAPER_LANDER
 from guidance.tracking.reference import TrackingReference
 from guidance.tracking.soft_landing import plan_soft_landing
 from hda.flight import vehicle
-from hda.flight.vehicle import ControlPeriods, FlightErrors, FlightStatus, Segment, fly_interval
+from hda.flight.vehicle import ControlPeriods, FlightErrors, FlightStatus, Segment, Surroundings, fly_over
 from hda.policy import Command, Decision, PlanCommand, ZemZevCommand
 
 GRAVITY = np.array([0.0, 0.0, -1.62])
@@ -28,7 +28,7 @@ PERIOD = 0.5
 
 def fly(state: State, command: Command, periods: int, lander: Lander = PAPER_LANDER) -> Segment:
     interval, errors = ControlPeriods(PERIOD, periods), FlightErrors(0.03)
-    return fly_interval(state, Decision(SITE, command), lander, GRAVITY, interval, errors)
+    return fly_over(state, Decision(SITE, command), lander, Surroundings(GRAVITY), interval, errors)
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,7 @@ from hda.flight.episode import Flight, advance, begin_flight, fly_legs, inform_p
 from hda.navigation import NavigationSystem, SiteFixes, choose_site, measure_ranges, navigate, track_site
 from hda.task.estimation import estimation_error
 from hda.task.presets import PRESETS, Preset
-from hda.task.scenario import Scenario, ground_point
+from hda.task.scenario import Scenario, frame_point, ground_point
 
 ON_PLANE = replace(PRESETS["paper"], name="navigated-on-plane", navigation=NavigationSystem())
 """The filter where looks are cheap and flights end on the plane."""
@@ -156,6 +156,22 @@ def test_the_preset_is_lidar_with_a_filter():
     assert (system.horizontal_error, system.vertical_error, system.velocity_error) == (20.0, 5.0, 0.2)
     assert system.velocimeter is not None
     assert system.velocimeter.floor == 30.0
+
+
+@pytest.mark.parametrize("name", ["oracle", "oracle-fuel", "hindsight"])
+@pytest.mark.parametrize("preset", ["navigated", "navigated-on-plane"])
+def test_a_policy_that_sees_the_map_lands_on_the_safe_cell_that_it_chose(name: str, preset: str):
+    """The frame is metres off the map, so the site that it names is not the place it means."""
+    (scenario,) = draw(ON_PLANE if preset == ON_PLANE.name else PRESETS[preset], 1)
+    assert np.abs(scenario.navigation_error[:2]).max() > 2.0
+    record = hda.fly(hda.make_policy(name), scenario)
+    site = record.decisions[0].site
+    meant = ground_point(scenario, site)
+    np.testing.assert_allclose(frame_point(scenario, meant), site, atol=1e-9)
+    np.testing.assert_allclose(meant[:2] % 1.0, 0.5, atol=1e-9)  # the middle of a cell of the true map
+    assert scenario.tile.is_safe(meant)
+    assert record.outcome.safe_site
+    assert np.hypot(*(record.outcome.touchdown - meant)[:2]) < 2.0
 
 
 @pytest.mark.slow

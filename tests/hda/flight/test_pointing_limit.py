@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import hda
 from guidance import MOON_GRAVITY, Lander, State, time_to_go, zem_zev_acceleration
 from hda.flight.record import EpisodeRecord
-from hda.flight.vehicle import ControlPeriods, FlightErrors, Segment, fly_interval
+from hda.flight.vehicle import ControlPeriods, FlightErrors, Segment, Surroundings, fly_over
 from hda.policy import Decision, DecisionStatus, PlanCommand, ZemZevCommand
 from hda.task.presets import PRESETS, Preset
 from tests.equality import same
@@ -46,8 +46,8 @@ def random_interval(seed: int, lander: Lander) -> tuple[Segment, ZemZevCommand]:
     state = State(SITE + offset, np.array([*rng.uniform(-10, 10, 2), -sink]), 1200.0)
     command = ZemZevCommand(6.0, 2.0, time_to_go(state, SITE) * rng.uniform(0.8, 1.2))
     errors = FlightErrors(rng.uniform(-0.05, 0.05))
-    return fly_interval(
-        state, Decision(SITE, command), lander, GRAVITY, ControlPeriods(0.5, 10), errors
+    return fly_over(
+        state, Decision(SITE, command), lander, Surroundings(GRAVITY), ControlPeriods(0.5, 10), errors
     ), command
 
 

@@ -17,7 +17,7 @@ from guidance import (
     zem_zev_acceleration,
 )
 from hda.flight.held_thrust import FlightConditions, VehicleLimits, hold_period
-from hda.flight.vehicle import ControlPeriods, FlightErrors, FlightStatus, Segment, fly_interval
+from hda.flight.vehicle import ControlPeriods, FlightErrors, FlightStatus, Segment, Surroundings, fly_over
 from hda.policy import Decision, ZemZevCommand
 from tests.oracles import flown_interval
 
@@ -47,7 +47,9 @@ def fly(
     thrust_error: float = 0.0,
     lander: Lander = PAPER_LANDER,
 ) -> Segment:
-    return fly_interval(state, Decision(SITE, command), lander, GRAVITY, interval, FlightErrors(thrust_error))
+    return fly_over(
+        state, Decision(SITE, command), lander, Surroundings(GRAVITY), interval, FlightErrors(thrust_error)
+    )
 
 
 def fall_time(height: float, climb: float) -> float:

@@ -8,7 +8,7 @@ from guidance.lander import PAPER_LANDER
 from guidance.state import State
 from guidance.tracking.reference import TrackingReference, make_reference
 from guidance.tracking.soft_landing import plan_soft_landing
-from hda.flight.vehicle import ControlPeriods, FlightErrors, FlightStatus, fly_interval
+from hda.flight.vehicle import ControlPeriods, FlightErrors, FlightStatus, Surroundings, fly_over
 from hda.policy import Decision, PlanCommand
 
 GRAVITY = np.array([0.0, 0.0, -1.62])
@@ -56,8 +56,13 @@ def flight() -> tuple[State, TrackingReference]:
 
 def fly(state: State, reference: TrackingReference, error: float, periods: int = 10):
     decision = Decision(SITE, PlanCommand(reference, GAINS))
-    return fly_interval(
-        state, decision, PAPER_LANDER, GRAVITY, ControlPeriods(PERIOD, periods), FlightErrors(error)
+    return fly_over(
+        state,
+        decision,
+        PAPER_LANDER,
+        Surroundings(GRAVITY),
+        ControlPeriods(PERIOD, periods),
+        FlightErrors(error),
     )
 
 

@@ -314,7 +314,7 @@ def test_no_damaged_byte_of_a_header_goes_unseen():
         for mask in (0x01, 0x0F, 0x20 ^ sound[position]):
             flip(path, position, mask)
             forget()
-            read = dtm_library._read(folder_of(2), 2)
+            read = dtm_library._read(folder_of(2), SMALL, 2)
             refused += read is None
             if read is not None:
                 assert_equal(read, truth)
@@ -328,7 +328,20 @@ def test_a_header_that_tells_another_type_is_refused(position, mask):
     load_tile(SMALL, 2, "train")
     flip(folder_of(2) / "elevation.npy", position, mask)
     forget()
-    assert dtm_library._read(folder_of(2), 2) is None
+    assert dtm_library._read(folder_of(2), SMALL, 2) is None
+
+
+def test_a_tile_whose_list_of_layers_is_not_its_grounds_is_built_again():
+    """A list that leaves a layer out, with the sums of the others right, is not the tile that was stored."""
+    load_tile(SMALL, 2, "train")
+    path = folder_of(2) / "checksums.json"
+    sums = json.loads(path.read_text())
+    assert set(sums) == set(LAYERS)
+    for wrong in ({name: sums[name] for name in LAYERS[:2]}, {**sums, "added": 0}, {}):
+        path.write_text(json.dumps(wrong))
+        forget()
+        assert dtm_library._read(folder_of(2), SMALL, 2) is None
+        assert_equal(load_tile(SMALL, 2, "train"), build_tile(SMALL, 2))
 
 
 # Places
@@ -429,5 +442,5 @@ def test_two_processes_that_build_at_once_leave_one_good_entry(tmp_path):
     assert [racer.returncode for racer in racers] == [0, 0]
     assert answers[0] == answers[1] != ""
     assert sorted(path.name for path in SMALL.folder().iterdir()) == ["parameters.json", "tile-00005"]
-    assert dtm_library._read(folder_of(5), 5) is not None
+    assert dtm_library._read(folder_of(5), SMALL, 5) is not None
     assert_equal(load_tile(SMALL, 5, "train"), build_tile(SMALL, 5))

@@ -124,6 +124,20 @@ def test_after_its_patience_it_doubts_itself_and_takes_the_reading(patience: int
     np.testing.assert_array_equal(memory.mean[3:], 0.0)
 
 
+@given(angle=st.floats(1.0, 89.0), gate=st.sampled_from([2.4, 16.27]), azimuth=st.floats(-3.1, 3.1))
+def test_beams_at_any_angle_are_believed_again(angle: float, gate: float, azimuth: float):
+    """Close beams hardly see a horizontal velocity: the doubt grows until what they read passes."""
+    memory = FilterMemory(np.zeros(ESTIMATED), 1e-4 * np.eye(SIZE), np.zeros(4, dtype=np.int64))
+    design = np.zeros((3, SIZE))
+    design[:, VELOCITY : VELOCITY + 3] = -Velocimeter(beam_angle=math.radians(angle)).beams
+    truth = np.array([20.0 * math.cos(azimuth), 20.0 * math.sin(azimuth), -3.0])
+    innovation = design[:, VELOCITY : VELOCITY + 3] @ truth
+    gating = (gate, 1, 1, VELOCITY, VELOCITY + 3)
+    assert take_in(memory, design, innovation, np.full(3, 1e-6), gating) > gate
+    assert memory.rejections[1] == 0
+    np.testing.assert_allclose(memory.mean[VELOCITY : VELOCITY + 3], truth, atol=0.5)
+
+
 def test_one_reading_that_is_far_off_does_no_harm():
     memory = FilterMemory(np.zeros(ESTIMATED), 0.01 * np.eye(SIZE), np.zeros(4, dtype=np.int64))
     design = np.zeros((1, SIZE))

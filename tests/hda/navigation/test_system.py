@@ -22,6 +22,7 @@ from hda.navigation import (
     draw_sensor_errors,
     navigate,
 )
+from hda.task.presets import PRESETS
 from hda.task.random_streams import EpisodeStreams
 from tests.hda.navigation.filter_cases import TARGET, fly_descent, run_filter, walk_ground
 
@@ -178,6 +179,28 @@ def test_flown_parts_that_do_not_fit_are_refused():
         navigate(SYSTEM, start, (time, path, heights[:3]), draw_readings(rng, 5))
     with pytest.raises(ValueError, match="draws must be for 5 periods, got 4"):
         navigate(SYSTEM, start, (time, path, heights), draw_readings(rng, 4))
+    late = time.copy()
+    late[-1] += 0.2  # where the flight ends
+    navigate(SYSTEM, start, (late, path, heights), draw_readings(rng, 5))
+    late[2] += 0.1
+    with pytest.raises(ValueError, match="all intervals but the last"):
+        navigate(SYSTEM, start, (late, path, heights), draw_readings(rng, 5))
+
+
+def test_a_sensor_is_read_at_whole_numbers_of_control_periods():
+    for period, every in ((0.5, 2), (0.25, 4), (1.0 / 3.0, 3)):
+        assert replace(SYSTEM, altimeter=None, velocimeter=None).numbers(period).terrain.every == every
+    for period in (0.3, 1.0):
+        with pytest.raises(ValueError, match="interval of Altimeter must be a whole number"):
+            SYSTEM.numbers(period)
+    rules = replace(PRESETS["paper"].rules, control_period=1.0)
+    with pytest.raises(ValueError, match=r"got 0\.5 s for 1 s"):
+        replace(PRESETS["navigated"], rules=rules)
+
+
+def test_an_altimeter_that_reads_only_low_is_lost_altogether():
+    low = replace(SYSTEM, altimeter=Altimeter(ceiling=80.0))
+    assert add_fault(low, "altimeter-lost-low").altimeter is None
 
 
 def test_errors_are_drawn_in_one_order_whatever_is_aboard():

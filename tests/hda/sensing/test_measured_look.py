@@ -10,7 +10,8 @@ from hda.safety.criteria import SafetyCriteria
 from hda.safety.safety_map import assess_safety
 from hda.sensing.gridding import ElevationMap, PixelGrid
 from hda.sensing.measured_look import MeasuredGround, assess_elevation, find_holes, measure_ground
-from hda.sensing.ranging import RangingLidar, draw_scan, scan
+from hda.sensing.ranging import RangingLidar, scan
+from hda.sensing.scan_draws import draw_scan
 
 PLANE = 50.0
 CRITERIA = SafetyCriteria()

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from scipy.stats import chi2
 
 from guidance.state import State
-from hda.sensing.ranging import PointCloud, RangingLidar, ScanDraws, draw_scan, scan
+from hda.sensing.ranging import PointCloud, RangingLidar, scan
+from hda.sensing.scan_draws import ScanDraws, draw_scan
 from hda.task.random_streams import EpisodeStreams
 from tests.oracles import ray_march
 
