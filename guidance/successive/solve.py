@@ -65,7 +65,10 @@ def solve_pdg_6dof(
         InfeasibleError: not even a point mass that turns at once has a flight; proved by
             `error.plan.certificate`.
         SolverFailedError: no flight was found, or the flight that was found does not keep its limits between
-            the nodes; nothing is proved. `error.plan` is the point mass's plan.
+            the nodes; nothing is proved.
+
+    An error holds a `Plan`, as that of every planner does: of the point mass, with the status and message of
+    the RigidPlan, and no flight. `throw=False` gives the RigidPlan itself.
     """
     if isinstance(nodes, bool) or not isinstance(nodes, int | np.integer) or nodes < _FEWEST_NODES:
         raise ValueError(f"nodes must be an integer of at least {_FEWEST_NODES}, got {nodes!r}")
@@ -81,10 +84,18 @@ def solve_pdg_6dof(
     )
     plan = _plan(problem, int(nodes))
     if throw and not plan.status.has_flight:
-        assert plan.point_mass is not None
-        kind = InfeasibleError if plan.status is PlanStatus.INFEASIBLE else SolverFailedError
-        raise kind(f"{plan.status.value}: {plan.message}", plan.point_mass)
+        raise _error(plan)
     return plan
+
+
+def _error(plan: RigidPlan) -> InfeasibleError | SolverFailedError:
+    assert plan.point_mass is not None
+    words, label = f"{plan.status.value}: {plan.message}", plan.point_mass
+    if plan.status is PlanStatus.INFEASIBLE:
+        return InfeasibleError(words, label)
+    return SolverFailedError(
+        words, Plan(plan.status, label.problem, plan.method, message=plan.message, solves=plan.solves)
+    )
 
 
 def _plan(problem: RigidLandingProblem, nodes: int) -> RigidPlan:
@@ -109,13 +120,13 @@ def _plan(problem: RigidLandingProblem, nodes: int) -> RigidPlan:
 def _judge(problem: RigidLandingProblem, units: RigidUnits, ending: Ending, easy: Plan) -> RigidPlan:
     """Fly what the iteration found, and say what it is."""
     solves = easy.solves + ending.solves
-    if not ending.converged:
-        status = PlanStatus.SOLVER_FAILED if "Clarabel" in ending.words else PlanStatus.LIMIT_REACHED
-        return RigidPlan(status, problem, METHOD, message=ending.words, point_mass=easy, solves=solves)
+    if ending.status is not PlanStatus.OPTIMAL:
+        words = ending.words
+        return RigidPlan(ending.status, problem, METHOD, message=words, point_mass=easy, solves=solves)
     flight = ending.iterate.flight(problem, units)
     plan = RigidPlan(PlanStatus.OPTIMAL, problem, METHOD, flight, "optimal", easy, solves)
     if plan.keeps_limits:
         return plan
     name, excess = max(plan.residuals.excess(problem).items(), key=lambda item: item[1])
     words = f"flown, the plan leaves its limits: {name} {excess:.1f} times what is allowed; try more nodes"
-    return RigidPlan(PlanStatus.SOLVER_FAILED, problem, METHOD, message=words, point_mass=easy, solves=solves)
+    return RigidPlan(PlanStatus.LIMIT_REACHED, problem, METHOD, message=words, point_mass=easy, solves=solves)
