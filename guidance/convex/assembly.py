@@ -15,7 +15,7 @@ import numpy as np
 
 from guidance.arrays import Array
 from guidance.constants import MOON_GRAVITY
-from guidance.convex.clarabel_solver import ConicAnswer, ConicSolver
+from guidance.convex.clarabel_solver import ConicAnswer, ConicSettings, ConicSolver
 from guidance.convex.constraints import Rows
 from guidance.convex.scaling import ScaledProblem, scale_problem
 from guidance.descent.limits import Cone, Limits
@@ -49,7 +49,7 @@ class Assembly:
         values, bound = self._numbers(rows)
         shape = (int(self.first[-1]), cost.size)
         matrix = csc_matrix((values, row[self._order], pointer), shape=shape)
-        self._nominal = matrix, bound, cost, cones_of(rows), tolerance
+        self._nominal, self._tolerance = (matrix, bound, cost, cones_of(rows)), tolerance
         self._solvers: dict[bool, ConicSolver] = {}
 
     def _numbers(self, rows: list[Rows]) -> tuple[Array, Array]:
@@ -62,10 +62,11 @@ class Assembly:
         Args:
             rows: of the same sparsity.
             cost: shape (n,).
-            refine: whether to refine each linear solve, as in `ConicSolver`.
+            refine: whether to refine each linear solve, as in `ConicSettings`.
         """
         if refine not in self._solvers:
-            self._solvers[refine] = ConicSolver(*self._nominal, refine)
+            settings = ConicSettings(self._tolerance, refine)
+            self._solvers[refine] = ConicSolver(*self._nominal, settings)
         return self._solvers[refine].solve(*self._numbers(rows), cost)
 
 

@@ -198,7 +198,7 @@ def solve_branches(
         weights: shape (branches,).
 
     Returns:
-        Each branch as a solution of its own, seen from the first target; None if there are none.
+        Each branch as a solution of its own, seen from the first target; None where none was found.
     """
     branching = Branching(constraint_set, len(scaled), shared_nodes)
     if constraint_set.can_condense:

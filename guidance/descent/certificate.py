@@ -39,5 +39,9 @@ class Certificate:
 
     @property
     def verified(self) -> bool:
-        """Whether every proof holds, and implies the lower bound."""
+        """Whether every proof holds, and implies the lower bound; a closed form has none, and counts as held.
+
+        The check runs when it is asked for. Before a planner says that there is no flight, it has run for
+        Farkas proofs, not for a dual bound.
+        """
         return all(proof.supports(self.lower_bound) and proof.verified for proof in self.proofs)

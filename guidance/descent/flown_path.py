@@ -64,14 +64,8 @@ def fly_states(
         dt = (time[k + 1] - time[k]) / BETWEEN
         for part in range(BETWEEN):  # in scalars: arrays would take three times as long
             row = k * BETWEEN + part
-            x0, y0, z0, east0, north0, up0 = (
-                out[row, 0],
-                out[row, 1],
-                out[row, 2],
-                out[row, 3],
-                out[row, 4],
-                out[row, 5],
-            )
+            x0, y0, z0 = out[row, 0], out[row, 1], out[row, 2]
+            east0, north0, up0 = out[row, 3], out[row, 4], out[row, 5]
             x, y, z, east, north, up, mass = x0, y0, z0, east0, north0, up0, out[row, 6]
             dx, dy, dz, deast, dnorth, dup, burnt = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
             for stage in range(4):
@@ -86,12 +80,8 @@ def fly_states(
                 ahead = dt if stage == 2 else 0.5 * dt
                 weight = 2.0 if stage in (1, 2) else 1.0
                 dx, dy, dz = dx + weight * east, dy + weight * north, dz + weight * up
-                deast, dnorth, dup = (
-                    deast + weight * to_east,
-                    dnorth + weight * to_north,
-                    dup + weight * to_up,
-                )
-                burnt += weight * flow
+                deast, dnorth = deast + weight * to_east, dnorth + weight * to_north
+                dup, burnt = dup + weight * to_up, burnt + weight * flow
                 x, y, z = x0 + ahead * east, y0 + ahead * north, z0 + ahead * up
                 east, north, up = east0 + ahead * to_east, north0 + ahead * to_north, up0 + ahead * to_up
                 mass = out[row, 6] - ahead * flow

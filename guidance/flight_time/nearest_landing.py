@@ -8,6 +8,7 @@ the position. Of the points that a tank pays for, the nearest has
 
 two equations for the two numbers s. Of the points at one distance from the target, the cheapest has the
 second one too. Newton's method in s solves either pair; at each s the extremal follows from the one before.
+Both are conditions of the first order: that no other point is nearer, the tests compare.
 """
 
 from __future__ import annotations
@@ -105,7 +106,8 @@ def solve_nearest(
         x: the extremal to that point, in seconds; that of the answer.
 
     Returns:
-        Whether it was found, and no point nearby is nearer, or cheaper.
+        Whether it was found: a stationary point, at which the propellant falls away from the target. That no
+        point nearby is nearer, or cheaper, is not looked at.
     """
     here, there, moved, trial = np.empty(2), np.empty(2), np.empty(2), new_extremal()
     if not _set_misses(point, x, problem, goal, here):

@@ -3,7 +3,8 @@
 The relaxed flight that the best affine primer leads may cut through the ground. At the time at which it does
 so most, the limit joins the dual problem: its multiplier gives the primer a kink there
 (`guidance.lower_bound.dual_function`). Which time and which side of the cone is a guess; that only costs
-tightness.
+tightness. Where the flight of the indirect method touches the ground, its own kink is the guess that leads
+(`guidance.lower_bound.neighbour_cover.kinked_primer_of`).
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
 """Powered-descent guidance: `solve_pdg`, the public entry to every planner, and its command line.
 
-`solve` checks the arguments and says what became of them, `fallbacks` who is asked and in which order.
+`solve` checks the arguments and says what became of them, `request` holds what is asked, `fallbacks` who is
+asked and in which order.
 Nothing below imports this wing; `guidance.tracking` and other packages do.
 """
 

@@ -1,32 +1,32 @@
 """Who is asked next where a planner has no answer: the one place where planners meet.
 
 1. The method that was chosen. That is, for 'auto': the indirect method; where it has no flight that keeps the
-   limits the dual bound, which may show that there is none; then the convex problem.
+   limits, closed forms and the dual bound, which may show that there is none; then the convex problem. With
+   a time of flight, a landing error's price or a turning site, the convex problem comes at once after it.
 2. Where relaxing lost min_thrust or the pointing limit, the unrelaxed problem from several guesses.
 3. Where the unrelaxed problem's local method finds nothing, the convex problem for a guess.
 4. Where the flown plan misses its limits, the same on a finer mesh.
-5. Without a flight: the reachable point nearest to the target, if asked for; then a proof that there is no
-   flight; where that search meets a feasible time instead, the convex problem from there.
+5. Without a flight: the reachable point nearest to the target, if asked for, by the indirect method where
+   'auto' was chosen and the time of flight is free, else by the convex problem; then, if the first step has
+   brought none, a proof that there is no flight; where that search meets a feasible time instead, the convex
+   problem from there.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
-
-import numpy as np
 
 from guidance.descent.certificate import Certificate
 from guidance.descent.plan import Plan, PlanStatus
-from guidance.descent.problem import LandingProblem
-from guidance.flight_time.primer_vector import PrimerFlight, find_extremal_flight
+from guidance.flight_time.primer_vector import PrimerFlight
 from guidance.flight_time.time_window import time_window
+from guidance.pdg.request import Request, remaining_time
 from guidance.pdg.unrelaxed import plan_unrelaxed
 from guidance.planning.indirect_planner import plan_indirect, plan_nearest_indirect
-from guidance.state import State
 
 if TYPE_CHECKING:
     from guidance.convex.programme import ConvexSolution
@@ -36,64 +36,6 @@ MOST_NODES = 1000
 
 _NOT_CURED_BY_NODES = ("thrust_below", "pointing", "final_thrust_direction", "propellant")
 _OUT_OF_REACH = "the thrust and the propellant on board do not suffice for any flight to the target"
-
-
-@dataclass(frozen=True, eq=False)
-class Request:
-    """What `solve_pdg` asks of a planner.
-
-    Attributes:
-        problem: the landing problem.
-        nodes: N.
-        time_of_flight: [s] or None to search for the best.
-        method: 'auto', 'indirect', 'convex', 'casadi' or 'cvxpy'.
-        guess: an earlier plan of nearly the same flight, or None.
-        provisional: whether the plan will be replaced before it is flown to its end, as in closed loop: it is
-            taken as it is found, on its mesh and near the best time.
-        landing_error_weight: [kg/m] price of a landing error; None lands at the target.
-    """
-
-    problem: LandingProblem
-    nodes: int
-    time_of_flight: float | None
-    method: str
-    guess: Plan | None = None
-    provisional: bool = False
-    landing_error_weight: float | None = None
-
-    @cached_property
-    def extremal(self) -> PrimerFlight | None:
-        """What the indirect method finds, whether or not it breaks a limit."""
-        if self.landing_error_weight is not None:
-            return None
-        return find_extremal_flight(self.problem, self.time_of_flight)
-
-    @property
-    def flight(self) -> PrimerFlight | None:
-        """The same, where it keeps every limit."""
-        return None if self.extremal is None or self.extremal.broken else self.extremal
-
-    @property
-    def bounds_first(self) -> bool:
-        """Whether the dual bound is asked before any search."""
-        asked = self.time_of_flight is None and self.method in ("auto", "convex")
-        return asked and self.landing_error_weight is None and not self.problem.rotates
-
-    def finer(self, nodes: int, found: Plan) -> Request:
-        """The same on more nodes, from the plan found so far."""
-        return replace(self, nodes=nodes, guess=found)
-
-
-def remaining_time(guess: Plan, state: State) -> float | None:
-    """[s] what is left of an earlier plan at its node nearest to `state`; None if nothing is."""
-    if guess.nodes == 0:
-        return None
-    duration = guess.time_of_flight
-    gap = np.linalg.norm(guess.position - state.position, axis=1) + 0.1 * duration * np.linalg.norm(
-        guess.velocity - state.velocity, axis=1
-    )
-    remaining = duration - float(guess.time[int(gap.argmin())])
-    return remaining if remaining > 0.0 else None
 
 
 def answer(request: Request, unreachable: str) -> Plan:

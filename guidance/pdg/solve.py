@@ -18,7 +18,8 @@ from guidance.descent.limits import NO_LIMITS, Limits
 from guidance.descent.plan import InfeasibleError, Plan, PlanStatus, SolverFailedError
 from guidance.descent.problem import LandingProblem
 from guidance.lander import PAPER_LANDER, Lander
-from guidance.pdg.fallbacks import Request, answer
+from guidance.pdg.fallbacks import answer
+from guidance.pdg.request import Request
 from guidance.state import State
 from guidance.validation import finite_number
 

@@ -13,7 +13,8 @@ from guidance.convex.constraint_set import ConstraintSet
 from guidance.convex.programme import ConvexSolution, ConvexTemplate, convex_template
 from guidance.convex.scaling import ScaledProblem, scale_problem
 from guidance.descent.problem import LandingProblem
-from guidance.descent.residuals import FLIGHT_TOLERANCE, final_thrust_excess, pointing_excess
+from guidance.descent.residuals import FLIGHT_TOLERANCE
+from guidance.descent.thrust_direction import final_thrust_excess, pointing_excess
 
 _THRUST_TOLERANCE = 5e-4  # relative; half of what a plan promises
 _RATE_TOLERANCE = 0.5 * FLIGHT_TOLERANCE.thrust_rate

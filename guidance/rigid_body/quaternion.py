@@ -17,16 +17,6 @@ from guidance.validation import finite_vector
 
 
 @compile_kernel
-def multiply_into(first: Array, second: Array, out: Array) -> None:
-    """Write the Hamilton product, the turn by `second` and then by `first`, into `out`, which is neither."""
-    w, x, y, z = first[0], first[1], first[2], first[3]
-    out[0] = w * second[0] - x * second[1] - y * second[2] - z * second[3]
-    out[1] = w * second[1] + x * second[0] + y * second[3] - z * second[2]
-    out[2] = w * second[2] - x * second[3] + y * second[0] + z * second[1]
-    out[3] = w * second[3] + x * second[2] - y * second[1] + z * second[0]
-
-
-@compile_kernel
 def rotate_into(attitude: Array, vector: Array, out: Array) -> None:
     """Write a body vector, seen from the site frame, into `out`, which is not `vector`.
 

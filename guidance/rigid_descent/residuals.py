@@ -50,10 +50,10 @@ class RigidResiduals:
         thrust_below: [N] greatest lack below min_thrust.
         gimbal: [rad] greatest excess of the commanded thrust's angle from the body's z axis.
         torque: [N m] greatest excess of a commanded torque.
-        rate: [rad/s] greatest excess over the body's rate limit, flown, between the second node and the last.
-        tilt: [rad] the same over the tilt limit.
-        glide_slope: [m] greatest horizontal distance outside the glide slope cone, likewise.
-        altitude: [m] greatest depth below the target, likewise.
+        rate: [rad/s] greatest excess over the body's rate limit, flown.
+        tilt: [rad] the same over the tilt limit, and over `first_tilt_limit` before the second node.
+        glide_slope: [m] greatest horizontal distance outside the glide slope cone, flown.
+        altitude: [m] greatest depth below the target, flown.
         propellant: [kg] flown propellant beyond what was on board.
     """
 
@@ -109,7 +109,8 @@ def fly_plan(flight: RigidFlight, problem: RigidLandingProblem, parts: int = 1) 
         parts: into how many equal parts an interval is cut.
 
     Returns:
-        Shape ((N - 1) parts + 1, 17): flown states, every `parts`-th at a node.
+        Shape ((N - 1) parts + 1, 17): flown states, every `parts`-th at a node. The first is the problem's
+        start, with the flight's attitude or thrust only where these are free.
     """
     body = problem.body
     shares = np.linspace(0.0, 1.0, parts + 1)
@@ -120,7 +121,10 @@ def fly_plan(flight: RigidFlight, problem: RigidLandingProblem, parts: int = 1) 
         return np.stack([at[:, :-1], at[:, 1:]], axis=2).reshape(-1, 2, 3)
 
     start = problem.state.as_array()
-    start[6:10], start[14:17] = flight.attitude[0], flight.thrust[0]
+    if problem.free_attitude:
+        start[6:10] = flight.attitude[0]
+    if problem.free_thrust:
+        start[14:17] = flight.thrust[0]
     durations = np.repeat(np.diff(flight.time) / parts, parts)
     thrust, torque = cut(flight.thrust_commands(body.engine_lag)), cut(flight.torque_commands())
     return fly_intervals(start, thrust, torque, durations, body.numbers(problem.gravity))
@@ -142,15 +146,17 @@ def fly_rigid_residuals(flight: RigidFlight, problem: RigidLandingProblem) -> Ri
     """
     body, lander = problem.body, problem.body.lander
     fine = fly_plan(flight, problem, _PARTS)
-    nodes, late, end = fine[::_PARTS], fine[_PARTS:], fine[-1]
+    nodes, end = fine[::_PARTS], fine[-1]
     command = flight.thrust_commands(body.engine_lag).reshape(-1, 3)
     size = np.linalg.norm(command, axis=1)
     lean = np.arctan2(np.linalg.norm(command[:, :2], axis=1), command[:, 2])
     burning = size > 1e-3 * lander.max_thrust
-    offset = late[:, :3] - problem.target
+    offset = fine[:, :3] - problem.target
     cone = math.tan(problem.glide_slope) if problem.glide_slope is not None else math.inf
     outside = np.linalg.norm(offset[:, :2], axis=1) - cone * np.maximum(offset[:, 2], 1e-9)
-    tilts = np.array([tilt_angle(attitude) for attitude in late[:, 6:10]])
+    tilts = np.array([tilt_angle(attitude) for attitude in fine[:, 6:10]])
+    bound = np.full(len(fine), body.tilt_limit)
+    bound[:_PARTS] = problem.first_tilt_limit
 
     def greatest(values: Array) -> float:
         return max(0.0, float(np.max(values, initial=0.0)))
@@ -169,8 +175,8 @@ def fly_rigid_residuals(flight: RigidFlight, problem: RigidLandingProblem) -> Ri
         thrust_below=greatest(lander.min_thrust - size),
         gimbal=greatest(lean[burning] - body.gimbal_limit),
         torque=greatest(np.abs(flight.torque) - np.array(body.torque_limit)),
-        rate=greatest(np.linalg.norm(late[:, 10:13], axis=1) - body.rate_limit),
-        tilt=greatest(tilts - body.tilt_limit),
+        rate=greatest(np.linalg.norm(fine[:, 10:13], axis=1) - body.rate_limit),
+        tilt=greatest(tilts - bound),
         glide_slope=greatest(outside) if problem.glide_slope is not None else 0.0,
         altitude=greatest(-offset[:, 2]),
         propellant=max(0.0, lander.dry_mass - float(end[13])),

@@ -1,7 +1,7 @@
 """The descent of a rigid body by successive convexification: `solve_pdg_6dof`.
 
-It asks `guidance.pdg` for the point mass's plan to start from, and Clarabel for every programme. It shares no
-code with `guidance.reference`.
+It asks `guidance.pdg` for the point mass's plan to start from, and Clarabel for every programme. No module of
+it imports `guidance.reference`, which holds no planner of rigid bodies yet.
 """
 
 from typing import TYPE_CHECKING

@@ -116,22 +116,38 @@ def jacobian_into(x: Array, u: Array, body: ScaledBody, by_state: Array, by_cont
         by_control[13, column] = -body.flow * unit
 
 
+class _Stage(NamedTuple):
+    """A place within an interval: state, variations, control, and the share that has passed."""
+
+    state: Array
+    variations: Array
+    control: Array
+    share: float
+
+
 @compile_kernel
 def _slope_into(
-    x: Array,
-    u: Array,
-    share: float,
+    at: _Stage,
     duration: float,
     body: ScaledBody,
-    variations: Array,
-    work: tuple[Array, Array],
+    jacobian: tuple[Array, Array],
     slope: Array,
     change: Array,
 ) -> None:
-    """Write d/ds of state and variations, s the share of the interval that has passed."""
-    by_state, by_control = work
-    scaled_rate_into(x, u, body, slope)
-    jacobian_into(x, u, body, by_state, by_control)
+    """Write d/ds of state and variations, s the share of the interval that has passed.
+
+    Args:
+        at: the place.
+        duration: of the interval.
+        body: the motion.
+        jacobian: memory for the derivatives of the rate by state and control.
+        slope: that of the state.
+        change: that of the variations.
+    """
+    by_state, by_control = jacobian
+    variations, share = at.variations, at.share
+    scaled_rate_into(at.state, at.control, body, slope)
+    jacobian_into(at.state, at.control, body, by_state, by_control)
     for row in range(STATE):
         for column in range(_WIDTH):
             change[row, column] = 0.0
@@ -161,7 +177,7 @@ def discretise(states: Array, controls: Array, durations: Array, body: ScaledBod
     count = durations.size
     ends = np.empty((count, STATE))
     table = np.empty((count, STATE, _WIDTH))
-    work = (np.zeros((STATE, STATE)), np.zeros((STATE, CONTROL)))
+    jacobian = (np.zeros((STATE, STATE)), np.zeros((STATE, CONTROL)))
     slopes, changes = np.empty((4, STATE)), np.empty((4, STATE, _WIDTH))
     step = 1.0 / SUBSTEPS
     for k in range(count):
@@ -178,7 +194,8 @@ def discretise(states: Array, controls: Array, durations: Array, body: ScaledBod
                 if stage > 0:
                     there = x + ahead * step * slopes[stage - 1]
                     moved = variations + ahead * step * changes[stage - 1]
-                _slope_into(there, u, share, h, body, moved, work, slopes[stage], changes[stage])
+                at = _Stage(there, moved, u, share)
+                _slope_into(at, h, body, jacobian, slopes[stage], changes[stage])
             x = x + step / 6.0 * (slopes[0] + 2.0 * (slopes[1] + slopes[2]) + slopes[3])
             total = changes[0] + 2.0 * (changes[1] + changes[2]) + changes[3]
             variations = variations + step / 6.0 * total

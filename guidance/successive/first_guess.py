@@ -2,16 +2,32 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+
 import numpy as np
 
 from guidance.arrays import Array
 from guidance.descent.plan import Plan
+from guidance.descent.problem import LandingProblem
 from guidance.rigid_body.quaternion import error_into, heading_angle, point_into
 from guidance.rigid_descent.flight import RigidFlight
 from guidance.rigid_descent.problem import RigidLandingProblem
 
 _BURNING = 0.02  # of full thrust: below, the thrust's direction says nothing
 _LONGER = 1.05  # the flight that must turn takes longer
+
+
+def easily_followed(problem: RigidLandingProblem) -> LandingProblem:
+    """The point mass that keeps the least thrust and the limit of tilt from the start on.
+
+    It bounds nothing, and may have no flight. Where it has one, the body follows that more easily than one of
+    `problem.point_mass`, which may leave the engine off where the body's cannot be.
+    """
+    point, body = problem.point_mass, problem.body
+    pointing = body.tilt_limit + body.gimbal_limit
+    lander = replace(body.lander, pointing_limit=pointing if pointing < math.pi else None)
+    return replace(point, lander=lander)
 
 
 def guess_flight(problem: RigidLandingProblem, plan: Plan, nodes: int) -> RigidFlight:

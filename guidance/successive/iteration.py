@@ -13,6 +13,7 @@ import numpy as np
 
 from guidance.arrays import Array
 from guidance.convex.clarabel_solver import SolveStatus
+from guidance.descent.plan import PlanStatus
 from guidance.rigid_descent.problem import RigidLandingProblem
 from guidance.successive.discretisation import discretise, shoot
 from guidance.successive.programme import SuccessiveProgramme
@@ -27,6 +28,7 @@ _RESTORED = 0.3  # share of the defects that a step may leave to be taken for th
 _SETTLED = 4e-6  # promised fall of the objective below which little is left to gain
 _SETTLING_TRUST = 1e-3  # at most, for that promise to mean something
 _POLISHING_TRUST, _MOST_POLISH = 0.03, 6  # small steps, taken until the motion is kept
+_EDGE = 1e-3  # of a time of flight: so near to an edge of its range it is held by it
 _DEFECT = 1e-7  # greatest defect of a flight that keeps the motion
 _NEAR = 0.02  # defects below which the motion's own prices weigh them, in place of the penalty
 _MOST_FAILURES = 4
@@ -39,40 +41,36 @@ class Ending:
 
     Attributes:
         iterate: the last flight that was taken.
-        converged: whether it keeps the motion and promises no further gain.
-        defect: greatest departure from the motion at a node, in scaled units.
+        status: OPTIMAL where it keeps the motion, the last programme promised no further gain and its time of
+            flight lies inside the range; SOLVER_FAILED where Clarabel gave no answer; else LIMIT_REACHED.
         solves: programmes solved.
         words: the ending in words.
     """
 
     iterate: Iterate
-    converged: bool
-    defect: float
+    status: PlanStatus
     solves: int
     words: str
 
 
-def iterate_programmes(
-    problem: RigidLandingProblem, units: RigidUnits, guess: Iterate, most: int = MOST_PROGRAMMES
-) -> Ending:
+def iterate_programmes(problem: RigidLandingProblem, units: RigidUnits, guess: Iterate) -> Ending:
     """Improve a guess until it is a flight of the body that no small change makes better.
 
     Args:
         problem: what to solve.
         units: its units.
         guess: where to start; it need not keep the motion.
-        most: programmes to solve at most.
     """
     body, programme = units.body(problem), SuccessiveProgramme(problem, units, guess)
     now, trust, failures, polished = guess, _FIRST_TRUST, 0, 0
     motion, solves = discretise(now.states, now.controls, now.intervals, body), 0
     defects = now.states[1:] - motion.ends
-    for solves in range(1, most + 1):
+    for solves in range(1, MOST_PROGRAMMES + 1):
         answer = programme.solve(now, motion, trust)
         if answer.status is not SolveStatus.SOLVED:
             failures += 1
             if failures > _MOST_FAILURES:
-                return Ending(now, False, _greatest(defects), solves, f"Clarabel: {answer.words}")
+                return Ending(now, PlanStatus.SOLVER_FAILED, solves, f"Clarabel: {answer.words}")
             trust *= _NARROWER
             continue
         after = programme.iterate_of(answer.primal)
@@ -93,11 +91,11 @@ def iterate_programmes(
         if trusted or restored or settled or polished > 0:
             now, defects = after, there
             motion = discretise(now.states, now.controls, now.intervals, body)
-        if polished > 0 and _greatest(defects) <= _DEFECT:
-            return Ending(now, True, _greatest(defects), solves, "converged")
+        if polished > 0 and _greatest(defects) <= _DEFECT and hoped < _SETTLED:
+            return _settled_ending(now, programme.window, units, solves)
         if polished == _MOST_POLISH:
             polished = 0
-            if programme.grow_penalty() > _DEAREST:
+            if _greatest(defects) > _DEFECT and programme.grow_penalty() > _DEAREST:
                 break
         elif settled or polished > 0:
             polished, trust = polished + 1, max(trust, _POLISHING_TRUST)
@@ -105,7 +103,17 @@ def iterate_programmes(
             trust = max(_LEAST_TRUST, trust * _WIDER)
         elif not trusted:
             trust = min(_MOST_TRUST, trust * _NARROWER)
-    return Ending(now, False, _greatest(defects), solves, _what_is_left(defects, solves))
+    return Ending(now, PlanStatus.LIMIT_REACHED, solves, _what_is_left(defects, solves))
+
+
+def _settled_ending(now: Iterate, window: tuple[float, float], units: RigidUnits, solves: int) -> Ending:
+    """That of a flight which no small change makes better, if its time of flight was free to change."""
+    shortest, longest = window
+    if (1.0 + _EDGE) * shortest < now.duration < (1.0 - _EDGE) * longest:
+        return Ending(now, PlanStatus.OPTIMAL, solves, "converged")
+    span = f"{shortest * units.time:.3g} to {longest * units.time:.3g} s"
+    words = f"the time of flight ends at an edge of its range, {span}; a better one may lie beyond"
+    return Ending(now, PlanStatus.LIMIT_REACHED, solves, words)
 
 
 def _greatest(defects: Array) -> float:
@@ -114,5 +122,6 @@ def _greatest(defects: Array) -> float:
 
 def _what_is_left(defects: Array, solves: int) -> str:
     if _greatest(defects) > _NEAR:
-        return f"no flight found in {solves} programmes; nothing is proved"
-    return f"not settled after {solves} programmes"
+        words = "nothing is proved, and more nodes, torque or rate_limit may give one"
+        return f"no flight found in {solves} programmes; {words}"
+    return f"not settled after {solves} programmes; another number of nodes may settle"

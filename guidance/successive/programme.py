@@ -30,7 +30,12 @@ _UPRIGHT = 1e-9
 
 
 class SuccessiveProgramme:
-    """The programme of a problem on a mesh; its sparsity is that of the first iterate."""
+    """The programme of a problem on a mesh; its sparsity is that of the first iterate.
+
+    Attributes:
+        penalty: shape (14,), on departures from the motion in each number of the state.
+        window: least and greatest time of flight.
+    """
 
     def __init__(self, problem: RigidLandingProblem, units: RigidUnits, guess: Iterate) -> None:
         """Keep what does not change.
@@ -42,7 +47,7 @@ class SuccessiveProgramme:
         """
         self._problem, self._units = problem, units
         self._layout = ProgrammeLayout(len(guess.states))
-        self._window = _SHORTEST * guess.duration, _LONGEST * guess.duration
+        self.window = _SHORTEST * guess.duration, _LONGEST * guess.duration
         self._solver: ConicSolver | None = None
         layout = self._layout
         weight = np.zeros(layout.size)
@@ -177,8 +182,8 @@ class SuccessiveProgramme:
         height = layout.state[1:-1, 2]
         entries.add("nonnegative", np.zeros(height.shape), (height, -1.0))
         span = np.array([layout.duration])
-        entries.add("nonnegative", np.array([-self._window[0]]), (span, -1.0))
-        entries.add("nonnegative", np.array([self._window[1]]), (span, 1.0))
+        entries.add("nonnegative", np.array([-self.window[0]]), (span, -1.0))
+        entries.add("nonnegative", np.array([self.window[1]]), (span, 1.0))
         for axis, limit in enumerate(problem.body.torque_limit):
             torque = layout.control[:, 3 + axis]
             if limit == 0.0:

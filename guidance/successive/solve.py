@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from guidance.constants import MOON_GRAVITY
 from guidance.descent.plan import InfeasibleError, Plan, PlanStatus, SolverFailedError
+from guidance.descent.problem import LandingProblem
 from guidance.pdg import solve_pdg
 from guidance.rigid_body.body import DEFAULT_BODY, RigidBody
 from guidance.rigid_body.state import RigidState
 from guidance.rigid_descent.plan import RigidPlan
 from guidance.rigid_descent.problem import RigidLandingProblem
 from guidance.state import State
-from guidance.successive.first_guess import guess_flight
+from guidance.successive.first_guess import easily_followed, guess_flight
 from guidance.successive.iteration import Ending, iterate_programmes
 from guidance.successive.units import Iterate, RigidUnits
 from guidance.validation import finite_vector
@@ -42,7 +44,7 @@ def solve_pdg_6dof(
     """Plan a descent that ends upright and at rest, within the body's thrust, torque, rate and tilt limits.
 
     By successive convexification on Clarabel, with a virtual control, a penalised trust region and free time
-    of flight (Szmuk and Acikmese, AIAA 2018-0617), from the point mass's plan. It is a local method: an
+    of flight (Szmuk and Acikmese, AIAA 2018-0617), from a point mass's plan. It is a local method: an
     OPTIMAL plan is a local optimum on its mesh, and `plan.relaxation_gap` bounds what a better one saves.
 
     Args:
@@ -65,7 +67,10 @@ def solve_pdg_6dof(
         InfeasibleError: not even a point mass that turns at once has a flight; proved by
             `error.plan.certificate`.
         SolverFailedError: no flight was found, or the flight that was found does not keep its limits between
-            the nodes; nothing is proved. `error.plan` is the point mass's plan.
+            the nodes; nothing is proved.
+
+    An error holds a `Plan`, as that of every planner does: of the point mass, with the status and message of
+    the RigidPlan, and no flight. `throw=False` gives the RigidPlan itself.
     """
     if isinstance(nodes, bool) or not isinstance(nodes, int | np.integer) or nodes < _FEWEST_NODES:
         raise ValueError(f"nodes must be an integer of at least {_FEWEST_NODES}, got {nodes!r}")
@@ -81,15 +86,38 @@ def solve_pdg_6dof(
     )
     plan = _plan(problem, int(nodes))
     if throw and not plan.status.has_flight:
-        assert plan.point_mass is not None
-        kind = InfeasibleError if plan.status is PlanStatus.INFEASIBLE else SolverFailedError
-        raise kind(f"{plan.status.value}: {plan.message}", plan.point_mass)
+        raise _error(plan)
     return plan
 
 
+def _error(plan: RigidPlan) -> InfeasibleError | SolverFailedError:
+    assert plan.point_mass is not None
+    words, label = f"{plan.status.value}: {plan.message}", plan.point_mass
+    if plan.status is PlanStatus.INFEASIBLE:
+        return InfeasibleError(words, label)
+    return SolverFailedError(
+        words, Plan(plan.status, label.problem, plan.method, message=plan.message, solves=plan.solves)
+    )
+
+
 def _plan(problem: RigidLandingProblem, nodes: int) -> RigidPlan:
-    point = problem.point_mass
-    easy = solve_pdg(
+    easy = _plan_point(problem.point_mass)
+    if not easy.status.has_flight:
+        words = f"the point mass has no plan ({easy.message})"
+        return RigidPlan(easy.status, problem, METHOD, message=words, point_mass=easy, solves=easy.solves)
+    lead, solves = easy, easy.solves
+    followed = easily_followed(problem)
+    if followed.lander != easy.problem.lander:
+        other = _plan_point(followed)
+        lead, solves = other if other.status.has_flight else easy, solves + other.solves
+    units = RigidUnits.of(problem)
+    guess = Iterate.of_flight(guess_flight(problem, lead, nodes), problem, units)
+    ending = iterate_programmes(problem, units, guess)
+    return _judge(problem, units, replace(ending, solves=solves + ending.solves), easy)
+
+
+def _plan_point(point: LandingProblem) -> Plan:
+    return solve_pdg(
         point.state,
         point.target,
         lander=point.lander,
@@ -98,24 +126,18 @@ def _plan(problem: RigidLandingProblem, nodes: int) -> RigidPlan:
         limits=point.limits,
         throw=False,
     )
-    if not easy.status.has_flight:
-        words = f"the point mass has no plan ({easy.message})"
-        return RigidPlan(easy.status, problem, METHOD, message=words, point_mass=easy, solves=easy.solves)
-    units = RigidUnits.of(problem)
-    guess = Iterate.of_flight(guess_flight(problem, easy, nodes), problem, units)
-    return _judge(problem, units, iterate_programmes(problem, units, guess), easy)
 
 
 def _judge(problem: RigidLandingProblem, units: RigidUnits, ending: Ending, easy: Plan) -> RigidPlan:
     """Fly what the iteration found, and say what it is."""
-    solves = easy.solves + ending.solves
-    if not ending.converged:
-        status = PlanStatus.SOLVER_FAILED if "Clarabel" in ending.words else PlanStatus.LIMIT_REACHED
-        return RigidPlan(status, problem, METHOD, message=ending.words, point_mass=easy, solves=solves)
+    solves = ending.solves
+    if ending.status is not PlanStatus.OPTIMAL:
+        words = ending.words
+        return RigidPlan(ending.status, problem, METHOD, message=words, point_mass=easy, solves=solves)
     flight = ending.iterate.flight(problem, units)
     plan = RigidPlan(PlanStatus.OPTIMAL, problem, METHOD, flight, "optimal", easy, solves)
     if plan.keeps_limits:
         return plan
     name, excess = max(plan.residuals.excess(problem).items(), key=lambda item: item[1])
     words = f"flown, the plan leaves its limits: {name} {excess:.1f} times what is allowed; try more nodes"
-    return RigidPlan(PlanStatus.SOLVER_FAILED, problem, METHOD, message=words, point_mass=easy, solves=solves)
+    return RigidPlan(PlanStatus.LIMIT_REACHED, problem, METHOD, message=words, point_mass=easy, solves=solves)

@@ -68,6 +68,18 @@ def test_numbers_that_are_not_finite_never_reach_the_solver(solver, bad):
     assert solver.solve(MATRIX.data, BOUND, COST).status is SolveStatus.SOLVED
 
 
+def test_a_quadratic_cost_takes_new_curvature_and_refuses_a_bad_one(solver):
+    """Least x'Px/2 + q'x above the bound: x = max(-q/p, bound), number by number."""
+    quadratic = ConicSolver(MATRIX, np.zeros(2), -COST, CONES, curvature=np.ones(2))
+    answer = quadratic.solve(MATRIX.data, np.zeros(2), -COST, np.array([2.0, 0.5]))
+    np.testing.assert_allclose(answer.primal, [0.5, 4.0], atol=1e-6)
+    for bad in ([np.nan, 1.0], [np.inf, 1.0], [-1.0, 1.0], [1.0], [1.0, 1.0, 1.0]):
+        with pytest.raises(ValueError, match="curvature"):
+            quadratic.solve(MATRIX.data, np.zeros(2), -COST, np.array(bad))
+    with pytest.raises(ValueError, match="without one"):
+        solver.solve(MATRIX.data, BOUND, COST, np.ones(2))
+
+
 class Panic(BaseException):
     """Stands for pyo3's PanicException, which is not an Exception."""
 

@@ -8,7 +8,8 @@ import pytest
 
 from guidance import PAPER_LANDER, Lander, Limits, State
 from guidance.descent.problem import LandingProblem
-from guidance.descent.residuals import Residuals, fly_residuals, pointing_excess
+from guidance.descent.residuals import Residuals, fly_residuals
+from guidance.descent.thrust_direction import pointing_excess
 from guidance.descent.trajectory import Trajectory
 
 PERFECT = dict.fromkeys((field.name for field in fields(Residuals)), 0.0)

@@ -22,7 +22,7 @@ import guidance
 from guidance import InfeasibleError, Lander, PlanStatus, SolverFailedError, State
 from guidance.convex.clarabel_solver import ConicSolver
 from guidance.convex.farkas import FarkasProof
-from guidance.pdg.fallbacks import remaining_time
+from guidance.pdg.request import remaining_time
 from guidance.planning.convex_task import ConvexTask
 from guidance.planning.infeasibility import prove_at
 

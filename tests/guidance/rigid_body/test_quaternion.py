@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from guidance.rigid_body import attitude_along, rotate
-from guidance.rigid_body.quaternion import error_into, heading_angle, multiply_into, tilt_angle
+from guidance.rigid_body.quaternion import error_into, heading_angle, tilt_angle
 from tests.guidance.rigid_body.rigid_cases import ATTITUDES, DIRECTIONS, vectors
 
 
@@ -20,14 +20,6 @@ def as_rotation(attitude: np.ndarray) -> Rotation:
 @given(attitude=ATTITUDES, vector=vectors(10.0))
 def test_a_body_vector_is_seen_as_scipy_sees_it(attitude, vector):
     np.testing.assert_allclose(rotate(attitude, vector), as_rotation(attitude).apply(vector), atol=1e-12)
-
-
-@given(first=ATTITUDES, second=ATTITUDES)
-def test_the_product_turns_by_the_second_and_then_by_the_first(first, second):
-    product = np.empty(4)
-    multiply_into(first, second, product)
-    both = as_rotation(first) * as_rotation(second)
-    np.testing.assert_allclose(as_rotation(product).as_matrix(), both.as_matrix(), atol=1e-12)
 
 
 @given(attitude=ATTITUDES, turn=vectors(1.7), sign=st.sampled_from((-1.0, 1.0)))
