@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from hda.flight.outcome import Ending, Outcome
     from hda.flight.record import EpisodeRecord
     from hda.flight.touchdown_report import TouchdownFault, TouchdownReport
-    from hda.flight.vehicle import FlightErrors, FlightStatus, Segment, fly_over
+    from hda.flight.vehicle import FlightErrors, FlightStatus, Segment, Surroundings, fly_over
 
 _HOMES = {
     "hda.flight.episode": (
@@ -41,6 +41,7 @@ _HOMES = {
         "FlightErrors",
         "FlightStatus",
         "Segment",
+        "Surroundings",
         "fly_over",
     ),
 }
@@ -53,6 +54,7 @@ __all__ = [
     "FlightStatus",
     "Outcome",
     "Segment",
+    "Surroundings",
     "TouchdownFault",
     "TouchdownReport",
     "advance",
