@@ -67,10 +67,8 @@ def solve_pdg_6dof(
         InfeasibleError: not even a point mass that turns at once has a flight; proved by
             `error.plan.certificate`.
         SolverFailedError: no flight was found, or the flight that was found does not keep its limits between
-            the nodes; nothing is proved.
-
-    An error holds a `Plan`, as that of every planner does: of the point mass, with the status and message of
-    the RigidPlan, and no flight. `throw=False` gives the RigidPlan itself.
+            the nodes; nothing is proved. `error.plan` is of the type of every planner's: a Plan of the point
+            mass without a flight, with this status and message. `throw=False` gives the RigidPlan itself.
     """
     if isinstance(nodes, bool) or not isinstance(nodes, int | np.integer) or nodes < _FEWEST_NODES:
         raise ValueError(f"nodes must be an integer of at least {_FEWEST_NODES}, got {nodes!r}")
