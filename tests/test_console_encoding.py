@@ -96,13 +96,12 @@ def test_commands_end_well_in_a_pipe_of_any_encoding(encoding, tmp_path):
 
 
 @pytest.mark.parametrize("encoding", ENCODINGS)
-def test_a_comparison_ends_well_with_its_table_cut_off_and_a_folder_of_any_name(encoding, tmp_path):
-    """It ended with exit code 2 after all was written: the table's ellipsis."""
+def test_a_comparison_ends_well_in_a_folder_of_any_name(encoding, tmp_path):
+    """It ended with exit code 2 after all was written: a character that the console lacks."""
     out = tmp_path / "r\u00e9sultats-\u65e5\u672c"
     sized = ["--episodes", "2", "--workers", "1", "--no-figures", "--no-report", "--out", str(out)]
     done = run(["studies.compare", "--policies", "nearest-safe", "no-divert", *sized], encoding)
     assert done.returncode == 0, done.stderr
     assert (out / "table.csv").exists()
     text = done.stdout.decode(encoding)
-    assert "~" in text or "\u2026" in text  # something was cut off
     assert r"\u65e5\u672c" in text

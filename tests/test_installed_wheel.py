@@ -69,6 +69,7 @@ RUNS: dict[str, tuple[list[str], list[str]]] = {
         ["looked/table.csv", "looked/looks.png", "looked/calibration.png"],
     ),
     "studies.memory": (["--train", "list"], []),
+    "studies.results": (["--list"], []),
     "studies.robustness": (
         [*SMALL, "--levels", "1", "--factors", "thrust-error", "--policies", "no-divert", "--out", "swept"],
         ["swept/thrust-error.png"],

@@ -44,7 +44,7 @@ def _reach_into(motion: Motion, time: float, out: Array) -> None:
 
 @compile_kernel
 def find_contact(motion: Motion, begin: float, end: float, footing: Footing, out: Array) -> float:
-    """First instant in [begin, end] [s] at which the lander touches the ground, or -1.
+    """First instant [s] from `begin` to `end` at which the lander touches the ground, or -1.
 
     `out` then holds the state there, else that at `end`.
     """

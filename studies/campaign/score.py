@@ -191,6 +191,7 @@ AT_LEAST_BY_TILE_COLUMN: Column[Score] = Column(
     unit="%",
     label=f"success at least, over independent tiles (at {AT_LEAST_CONFIDENCE:.0%})",
     late=True,
+    outputs=Output.ALL & ~Output.REPORT,
 )
 
 MEASURE_COLUMNS = (

@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 
+from hda import registry
 from studies.launcher import COMMANDS
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -31,7 +32,12 @@ def python_blocks(page: str) -> list[str]:
 
 @pytest.fixture
 def empty_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An empty folder to run in, from which the repository's examples can be imported."""
+    """An empty folder to run in, from which the repository's examples can be imported.
+
+    What a page registers is forgotten after it.
+    """
+    registry.policy_names()
+    monkeypatch.setattr(registry, "REGISTRY", registry.REGISTRY.copy())
     monkeypatch.syspath_prepend(str(ROOT))
     monkeypatch.chdir(tmp_path)
     return tmp_path

@@ -130,11 +130,11 @@ def test_the_table_of_the_readme_is_that_of_the_comparison() -> None:
         name = cells[0].split(",")[0]
         if name.startswith("*"):
             long = full["*the paper: TD3*"]
-            assert cells[1:] == [long[1], long[2], long[6], long[5]]
+            assert cells[1:] == [long[1], long[2], long[7], long[6]]
             continue
         long = full.get(name) or full[f"{name} *"]
         clustered = re.sub(r" \([^)]*\)", "", long[1])
-        assert cells[1:] == [clustered, long[2].split()[0], long[6], long[5]], name
+        assert cells[1:] == [clustered, long[2].split()[0], long[7], long[6]], name
 
 
 @pytest.mark.parametrize("page", sorted(RESULTS.glob("*.md")), ids=lambda page: page.name)
