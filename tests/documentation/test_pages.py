@@ -1,5 +1,6 @@
 """What the README and the documentation show runs: Python blocks, and commands as far as their options."""
 
+import importlib
 import importlib.util
 import re
 import subprocess
@@ -34,8 +35,9 @@ def python_blocks(page: str) -> list[str]:
 def empty_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """An empty folder to run in, from which the repository's examples can be imported.
 
-    What a page registers is forgotten after it.
+    What a page registers is forgotten after it; the agents stay.
     """
+    importlib.import_module("rl")
     registry.policy_names()
     monkeypatch.setattr(registry, "REGISTRY", registry.REGISTRY.copy())
     monkeypatch.syspath_prepend(str(ROOT))
