@@ -26,7 +26,6 @@ _MASS_PENALTY = 4.0  # of mass out of nothing, beside that of the rest
 _TORQUE_WEIGHT = 0.05  # of the trust region, beside positions, velocities and thrusts
 _RATE_WEIGHT = 0.05
 _SHORTEST, _LONGEST = 0.2, 5.0  # time of flight over that of the first guess
-_UPRIGHT = 1e-9
 
 
 class SuccessiveProgramme:
