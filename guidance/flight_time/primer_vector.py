@@ -13,6 +13,7 @@ import numpy as np
 
 from guidance.arrays import Array
 from guidance.descent.problem import LandingProblem
+from guidance.flight_time.continuation import solve_from_impulses, solve_touching_from_edge
 from guidance.flight_time.extremal import (
     Extremal,
     PrimerProblem,
@@ -131,13 +132,19 @@ def find_extremal_flight(problem: LandingProblem, time: float | None = None) -> 
         return flight
     if time is not None or find_ground_contact(problem) is not None:
         return flight
-    if flight is None:
+    for seek in () if flight is not None else (_seek_full_burn, _seek_from_impulses):
         x = blank_extremal()
-        flight = _read(problem, scaled, x, _seek_full_burn(scaled, vehicle, x))
-        if flight is not None and flight.broken != ALTITUDE:
-            return flight
-    x = blank_extremal()
-    return _read(problem, scaled, x, _seek_touching(scaled, vehicle, x)) or flight
+        flight = _read(problem, scaled, x, seek(scaled, vehicle, x))
+        if flight is not None:
+            break
+    if flight is not None and flight.broken != ALTITUDE:
+        return flight
+    for seek in (_seek_touching, _seek_from_edge):
+        x = blank_extremal()
+        touching = _read(problem, scaled, x, seek(scaled, vehicle, x))
+        if touching is not None and touching.broken != ALTITUDE:
+            return touching
+    return flight
 
 
 def fly_to(problem: LandingProblem, x: Extremal, size: int) -> PrimerFlight | None:
@@ -176,6 +183,18 @@ def _seek_full_burn(problem: PrimerProblem, vehicle: _Vehicle, x: Extremal) -> i
 def _seek_touching(problem: PrimerProblem, vehicle: _Vehicle, x: Extremal) -> int:
     """The same for the extremal that touches the ground, of the best time."""
     return judge_extremal(x, problem, *vehicle) if solve_touching(problem, x) else _NOT_FOUND
+
+
+@compile_kernel
+def _seek_from_impulses(problem: PrimerProblem, vehicle: _Vehicle, x: Extremal) -> int:
+    """The same for an extremal that only problems with more thrust lead to."""
+    return judge_extremal(x, problem, *vehicle) if solve_from_impulses(problem, x) else _NOT_FOUND
+
+
+@compile_kernel
+def _seek_from_edge(problem: PrimerProblem, vehicle: _Vehicle, x: Extremal) -> int:
+    """The same for one that touches the ground and that only lower starts lead to."""
+    return judge_extremal(x, problem, *vehicle) if solve_touching_from_edge(problem, x) else _NOT_FOUND
 
 
 @compile_kernel
