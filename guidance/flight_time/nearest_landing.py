@@ -20,12 +20,14 @@ import numpy as np
 
 from guidance.arrays import Array
 from guidance.descent.problem import LandingProblem
+from guidance.flight_time.continuation import solve_touching_from_edge
 from guidance.flight_time.extremal import (
     Extremal,
     PrimerProblem,
     blank_extremal,
     copy_extremal,
     new_extremal,
+    touches,
 )
 from guidance.flight_time.path_limits import ALTITUDE, KEPT, PROPELLANT, burnt_share
 from guidance.flight_time.primer_equations import FREE, TOUCHING, solve_from, solve_touching
@@ -35,10 +37,15 @@ from guidance.kernel import compile_kernel
 ERROR_SHARE, ERROR_SLACK = 1e-3, 0.05
 """Of the least landing error, and [m] beside it: how much farther from the target the cheapest flight is."""
 _MOST_STEPS = 30
-_MOST_HALVINGS = 12
+_MOST_HALVINGS = 6
+_MOST_SHORT_STEPS = 3  # in a row, a quarter of the full step or less: it leads nowhere
 _CONVERGED = 1e-9  # of the square of the time of flight: millimetres
 _DIFFERENCE = 1e-5  # of the same
 _LONGEST = 0.1  # of the same: step
+_FULL = 1.0 - 1e-9  # of the tank: the nearest landing leaves that little of it
+_MOST_FAILURES = 6  # on the way to an empty tank
+_SHORT_COAST = 0.1  # of the time of flight: one so short is vanishing
+_SLIVER = 1e-2  # of the time of flight: a first burn so short may have to vanish
 
 
 @compile_kernel
@@ -112,6 +119,7 @@ def solve_nearest(
     here, there, moved, trial = np.empty(2), np.empty(2), np.empty(2), new_extremal()
     if not _set_misses(point, x, problem, goal, here):
         return False
+    short = 0
     for _ in range(_MOST_STEPS):
         unit = x.times[2] ** 2
         before = math.hypot(here[0], here[1])
@@ -122,6 +130,7 @@ def solve_nearest(
         if math.isnan(east):
             return False
         damping, better = min(1.0, _LONGEST * unit / max(math.hypot(east, north), 1e-300)), False
+        enough = 0.3 * damping
         for _ in range(_MOST_HALVINGS):
             moved[0], moved[1] = point[0] + damping * east, point[1] + damping * north
             copy_extremal(x, trial)
@@ -130,7 +139,8 @@ def solve_nearest(
             if better:
                 break
             damping *= 0.5
-        if not better:
+        short = short + 1 if damping < enough else 0
+        if not better or short > _MOST_SHORT_STEPS:
             return False
         copy_extremal(trial, x)
         point[0], point[1], here[0], here[1] = moved[0], moved[1], there[0], there[1]
@@ -139,18 +149,20 @@ def solve_nearest(
 
 @dataclass(frozen=True, eq=False)
 class NearestLanding:
-    """A flight to a point near the target.
+    """A flight to a point near the target, or what is left of the search for one.
 
     Attributes:
         problem: the landing there.
-        flight: the flight of least propellant to it.
+        flight: the flight of least propellant to it; None where none was found.
+        time: [s] its time of flight; without one, that of the last extremal on the way to it.
     """
 
     problem: LandingProblem
-    flight: PrimerFlight
+    flight: PrimerFlight | None
+    time: float
 
 
-def find_nearest_landing(problem: LandingProblem, overdrawn: PrimerFlight) -> NearestLanding | None:
+def find_nearest_landing(problem: LandingProblem, overdrawn: PrimerFlight) -> NearestLanding:
     """The cheapest flight to within a little more than the least landing error that the tank pays for.
 
     Args:
@@ -158,50 +170,98 @@ def find_nearest_landing(problem: LandingProblem, overdrawn: PrimerFlight) -> Ne
         overdrawn: its extremal, which burns more than there is.
 
     Returns:
-        The flight; None where none was found, or the one found breaks a limit of the problem.
+        The flight; or none, where none was found or the one found breaks a limit of the problem.
     """
+    none = NearestLanding(problem, None, overdrawn.time)
     if overdrawn.broken != PROPELLANT or problem.limits.line_of_sight is not None:
-        return None
+        return none
     x, unit = blank_extremal(), problem.lander.max_thrust / problem.state.mass
     copy_extremal(overdrawn.extremal, x)
     goal = -math.expm1(-problem.log_mass_ratio), ERROR_SLACK / unit
-    point, touching = np.zeros(2), False
-    while _seek_nearest(overdrawn.scaled, goal, touching, x, point):
+    point, touching = np.zeros(2), bool(touches(x))
+    for attempt in range(2):
+        found = _seek_nearest(overdrawn.scaled, goal, touching, attempt > 0, x, point)
+        none = replace(none, time=float(x.times[2]))
+        if not found:
+            return none
         target = problem.target.copy()
         target[:2] += unit * point
         there = replace(problem, target=target)
         flight = fly_to(there, x, TOUCHING if touching else FREE)
-        if flight is None or flight.broken == KEPT:
-            return None if flight is None else NearestLanding(there, flight)
-        if touching or flight.broken != ALTITUDE:
-            return None
+        if flight is not None and flight.broken == KEPT:
+            return NearestLanding(there, flight, flight.time)
+        if flight is None or touching or flight.broken != ALTITUDE:
+            return none
         touching = True
-    return None
+    return none
+
+
+@compile_kernel
+def _empty_tank(problem: PrimerProblem, share: float, size: int, x: Extremal, point: Array) -> bool:
+    """Find the nearest landing point that a share of the start mass pays for, in place.
+
+    At once; where that fails because the first burn vanishes on the way, without one; else by way of tanks
+    that hold more, unless it touches the ground or its coast vanishes.
+    """
+    first, begin, burnt = new_extremal(), point.copy(), burnt_share(x, problem.mass_flow)
+    copy_extremal(x, first)
+    if solve_nearest(point, problem, (share, math.nan), size, x):
+        return True
+    if 0.0 < x.times[0] < _SLIVER * x.times[2]:
+        x.times[0] = -x.times[0]
+        if solve_nearest(point, problem, (share, math.nan), size, x):
+            return True
+    trial, there, done, step = new_extremal(), point.copy(), 0.0, 0.5
+    vanishing = x.times[1] - max(x.times[0], 0.0) < _SHORT_COAST * x.times[2]
+    failures = _MOST_FAILURES if size == TOUCHING or vanishing else 0
+    while failures < _MOST_FAILURES:
+        copy_extremal(first, trial)
+        there[:] = begin
+        goal = burnt + min(done + step, 1.0) * (share - burnt)
+        if solve_nearest(there, problem, (goal, math.nan), size, trial):
+            done += step
+            step *= 2.0
+            copy_extremal(trial, first)
+            begin[:] = there
+        else:
+            step *= 0.4
+            failures += 1
+        if done >= 1.0:
+            copy_extremal(first, x)
+            point[:] = begin
+            return True
+    return False
 
 
 @compile_kernel
 def _seek_nearest(
-    problem: PrimerProblem, goal: tuple[float, float], touching: bool, x: Extremal, point: Array
+    problem: PrimerProblem, goal: tuple[float, float], touching: bool, anew: bool, x: Extremal, point: Array
 ) -> bool:
-    """Find the cheapest landing within the granted error, in place.
+    """Find the cheapest landing within the granted error, in place; where none is found, the nearest one.
 
     Args:
         problem: that of the target, in seconds.
         goal: the share of the start mass that is propellant, and the error granted beside ERROR_SHARE.
-        touching: whether the flight touches the ground; `point` is then near the answer.
+        touching: whether the flight touches the ground.
+        anew: whether the extremal is still to be found; `point` is then near the answer.
         x: the extremal to the point; the answer.
         point: where to begin; the answer.
     """
     share, slack = goal
     size = TOUCHING if touching else FREE
-    if touching:
+    if anew:
         r, v, g, flow = problem
         place = r.copy()
         place[0], place[1] = r[0] - point[0], r[1] - point[1]
-        if not solve_touching(PrimerProblem(place, v, g, flow), x):
+        there = PrimerProblem(place, v, g, flow)
+        if not (solve_touching(there, x) or solve_touching_from_edge(there, x)):
             return False
-    if not solve_nearest(point, problem, (share, math.nan), size, x):
+    if not _empty_tank(problem, share * _FULL, size, x, point):
         return False
-    near = math.hypot(point[0], point[1])
+    near, nearest, landing = math.hypot(point[0], point[1]), point.copy(), new_extremal()
+    copy_extremal(x, landing)
     far = (1.0 + ERROR_SHARE) * near + slack
-    return solve_nearest(point, problem, (share, far), size, x)
+    if not solve_nearest(point, problem, (share, far), size, x):
+        point[:] = nearest
+        copy_extremal(landing, x)
+    return True

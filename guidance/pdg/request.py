@@ -9,6 +9,7 @@ import numpy as np
 
 from guidance.descent.plan import Plan
 from guidance.descent.problem import LandingProblem
+from guidance.flight_time.nearest_landing import NearestLanding, find_nearest_landing
 from guidance.flight_time.primer_vector import PrimerFlight, find_extremal_flight
 from guidance.state import State
 
@@ -47,6 +48,13 @@ class Request:
     def flight(self) -> PrimerFlight | None:
         """The same, where it keeps every limit."""
         return None if self.extremal is None or self.extremal.broken else self.extremal
+
+    @cached_property
+    def nearest(self) -> NearestLanding | None:
+        """What the indirect method finds near a target that is out of reach; None where it is not asked."""
+        if self.method != "auto" or self.time_of_flight is not None or self.extremal is None:
+            return None
+        return find_nearest_landing(self.problem, self.extremal)
 
     @property
     def bounds_first(self) -> bool:
