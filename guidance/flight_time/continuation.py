@@ -118,7 +118,7 @@ def solve_touching_from_edge(problem: PrimerProblem, x: Extremal) -> bool:
         x: the answer, in seconds.
 
     Returns:
-        Whether it was found, and the ground bends its primer as it may: upward.
+        Whether it was found, as of `solve_touching`.
     """
     edge, trial, share, pull = _stopping_height(problem), new_extremal(), 1.0, problem.gravity
     if not LEAST_PULL < dot(pull, pull) < MOST_PULL or not problem.position[2] > edge:
@@ -139,4 +139,4 @@ def solve_touching_from_edge(problem: PrimerProblem, x: Extremal) -> bool:
             left, step = after, _LONGER * step
         else:
             step *= _SHORTER
-    return left == 0.0 and x.touch[1] > 0.0
+    return left == 0.0

@@ -254,7 +254,7 @@ def _seek_nearest(
         place = r.copy()
         place[0], place[1] = r[0] - point[0], r[1] - point[1]
         there = PrimerProblem(place, v, g, flow)
-        if not (solve_touching(there, x) or solve_touching_from_edge(there, x)):
+        if not (solve_touching(there, x) or solve_touching_from_edge(there, x)) or not x.touch[1] > 0.0:
             return False
     if not _empty_tank(problem, share * _FULL, size, x, point):
         return False
