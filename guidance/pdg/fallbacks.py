@@ -262,9 +262,10 @@ def _plan_nearest_without_solver(request: Request) -> Plan | None:
         if plan.status.has_flight and (request.provisional or plan.keeps_limits):
             return plan
         proof, method = prove_no_landing_anywhere(problem, window), "dual bound"
-    return (
-        None if proof is None else Plan(PlanStatus.INFEASIBLE, problem, method, message=_NOWHERE, proof=proof)
-    )
+    if proof is None:
+        return None
+    words = f"{_NOWHERE} (limits: {', '.join(proof.causes)})"
+    return Plan(PlanStatus.INFEASIBLE, problem, method, message=words, proof=proof)
 
 
 def _prove_infeasible(request: Request, anywhere: bool) -> Certificate | ConvexSolution | None:

@@ -119,10 +119,8 @@ def prove_free_time(task: ConvexTask) -> Certificate | ConvexSolution | None:
     if outer is not None:
         low, high = outer.before.longest, outer.after.shortest
         within = times[(low < times) & (times < high)]
-        times, beyond = (
-            np.append(within, 0.5 * (low + high)),
-            f"dual bounds, up to {low:.4g} and from {high:.4g} s",
-        )
+        times = within if within.size > 0 else np.array([0.5 * (low + high)])
+        beyond = f"dual bounds, up to {low:.4g} and from {high:.4g} s"
     proofs: list[FarkasProof] = []
     for time in times:
         proof = prove_at(task, float(time))

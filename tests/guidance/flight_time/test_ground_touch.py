@@ -188,7 +188,7 @@ def test_a_touch_is_known_at_a_given_time_of_flight_too(start, share):
     assert touches(flight_of(plan).extremal)
     assert plan.keeps_limits
     assert plan.residuals.altitude < 5e-3
-    assert best.propellant < plan.propellant == pytest.approx(convex.propellant, abs=0.02)
+    assert best.propellant < plan.propellant == pytest.approx(convex.propellant, abs=0.05)
     assert plan.certificate is not None
     assert plan.certificate.verified
     assert plan.certificate.lower_bound <= plan.propellant
