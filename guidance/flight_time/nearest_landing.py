@@ -162,12 +162,15 @@ class NearestLanding:
     time: float
 
 
-def find_nearest_landing(problem: LandingProblem, overdrawn: PrimerFlight) -> NearestLanding:
+def find_nearest_landing(
+    problem: LandingProblem, overdrawn: PrimerFlight, thorough: bool = True
+) -> NearestLanding:
     """The cheapest flight to within a little more than the least landing error that the tank pays for.
 
     Args:
         problem: the landing problem.
         overdrawn: its extremal, which burns more than there is.
+        thorough: whether fuller tanks may lead there, or the cheapest flight be given up for the nearest.
 
     Returns:
         The flight; or none, where none was found or the one found breaks a limit of the problem.
@@ -178,9 +181,9 @@ def find_nearest_landing(problem: LandingProblem, overdrawn: PrimerFlight) -> Ne
     x, unit = blank_extremal(), problem.lander.max_thrust / problem.state.mass
     copy_extremal(overdrawn.extremal, x)
     goal = -math.expm1(-problem.log_mass_ratio), ERROR_SLACK / unit
-    point, touching = np.zeros(2), bool(touches(x))
+    point, touching = np.zeros(2), thorough and bool(touches(x))
     for attempt in range(2):
-        found = _seek_nearest(overdrawn.scaled, goal, touching, attempt > 0, x, point)
+        found = _seek_nearest(overdrawn.scaled, goal, (touching, attempt > 0, thorough), x, point)
         none = replace(none, time=float(x.times[2]))
         if not found:
             return none
@@ -197,71 +200,85 @@ def find_nearest_landing(problem: LandingProblem, overdrawn: PrimerFlight) -> Ne
 
 
 @compile_kernel
-def _empty_tank(problem: PrimerProblem, share: float, size: int, x: Extremal, point: Array) -> bool:
-    """Find the nearest landing point that a share of the start mass pays for, in place.
+def _by_fuller_tanks(
+    problem: PrimerProblem, share: float, begin: tuple[Extremal, Array], x: Extremal, point: Array
+) -> bool:
+    """Find the nearest landing point that a share of the start mass pays for, where Newton's method has not.
 
-    At once; where that fails because the first burn vanishes on the way, without one; else by way of tanks
-    that hold more, unless it touches the ground or its coast vanishes.
+    If the first burn vanishes on the way, without one; else from the start by way of tanks that hold more,
+    unless it is the coast that vanishes.
+
+    Args:
+        problem: that of the target, in seconds.
+        share: of the start mass that is propellant.
+        begin: the extremal from which it began, and its point; changed in place.
+        x: the extremal at which it stopped; the answer.
+        point: the same.
     """
-    first, begin, burnt = new_extremal(), point.copy(), burnt_share(x, problem.mass_flow)
-    copy_extremal(x, first)
-    if solve_nearest(point, problem, (share, math.nan), size, x):
-        return True
     if 0.0 < x.times[0] < _SLIVER * x.times[2]:
         x.times[0] = -x.times[0]
-        if solve_nearest(point, problem, (share, math.nan), size, x):
+        if solve_nearest(point, problem, (share, math.nan), FREE, x):
             return True
-    trial, there, done, step = new_extremal(), point.copy(), 0.0, 0.5
-    vanishing = x.times[1] - max(x.times[0], 0.0) < _SHORT_COAST * x.times[2]
-    failures = _MOST_FAILURES if size == TOUCHING or vanishing else 0
-    while failures < _MOST_FAILURES:
-        copy_extremal(first, trial)
-        there[:] = begin
+    if x.times[1] - max(x.times[0], 0.0) < _SHORT_COAST * x.times[2]:
+        return False
+    known, there = begin
+    burnt, failures, done, step = burnt_share(known, problem.mass_flow), 0, 0.0, 0.5
+    while failures < _MOST_FAILURES and done < 1.0:
+        copy_extremal(known, x)
+        point[:] = there
         goal = burnt + min(done + step, 1.0) * (share - burnt)
-        if solve_nearest(there, problem, (goal, math.nan), size, trial):
+        if solve_nearest(point, problem, (goal, math.nan), FREE, x):
             done += step
             step *= 2.0
-            copy_extremal(trial, first)
-            begin[:] = there
+            copy_extremal(x, known)
+            there[:] = point
         else:
             step *= 0.4
             failures += 1
-        if done >= 1.0:
-            copy_extremal(first, x)
-            point[:] = begin
-            return True
-    return False
+    return done >= 1.0
 
 
 @compile_kernel
 def _seek_nearest(
-    problem: PrimerProblem, goal: tuple[float, float], touching: bool, anew: bool, x: Extremal, point: Array
+    problem: PrimerProblem,
+    goal: tuple[float, float],
+    how: tuple[bool, bool, bool],
+    x: Extremal,
+    point: Array,
 ) -> bool:
-    """Find the cheapest landing within the granted error, in place; where none is found, the nearest one.
+    """Find the cheapest landing within the granted error, in place.
 
     Args:
         problem: that of the target, in seconds.
         goal: the share of the start mass that is propellant, and the error granted beside ERROR_SHARE.
-        touching: whether the flight touches the ground.
-        anew: whether the extremal is still to be found; `point` is then near the answer.
+        how: whether the flight touches the ground; whether it is still to be found, and `point` is near the
+            answer; and whether to be thorough, as of `find_nearest_landing`.
         x: the extremal to the point; the answer.
         point: where to begin; the answer.
     """
     share, slack = goal
+    touching, anew, thorough = how
     size = TOUCHING if touching else FREE
     if anew:
         r, v, g, flow = problem
         place = r.copy()
         place[0], place[1] = r[0] - point[0], r[1] - point[1]
         there = PrimerProblem(place, v, g, flow)
-        if not (solve_touching(there, x) or solve_touching_from_edge(there, x)) or not x.touch[1] > 0.0:
+        found = solve_touching(there, x) or (thorough and solve_touching_from_edge(there, x))
+        if not found or not x.touch[1] > 0.0:
             return False
-    if not _empty_tank(problem, share * _FULL, size, x, point):
+    known, begin, tank = new_extremal(), point.copy(), share * _FULL if thorough else share
+    copy_extremal(x, known)
+    found = solve_nearest(point, problem, (tank, math.nan), size, x)
+    if not found and thorough and not touching:
+        found = _by_fuller_tanks(problem, tank, (known, begin), x, point)
+    if not found:
         return False
-    near, nearest, landing = math.hypot(point[0], point[1]), point.copy(), new_extremal()
-    copy_extremal(x, landing)
-    far = (1.0 + ERROR_SHARE) * near + slack
-    if not solve_nearest(point, problem, (share, far), size, x):
-        point[:] = nearest
-        copy_extremal(landing, x)
-    return True
+    copy_extremal(x, known)
+    begin[:] = point
+    far = (1.0 + ERROR_SHARE) * math.hypot(point[0], point[1]) + slack
+    if solve_nearest(point, problem, (share, far), size, x):
+        return True
+    copy_extremal(known, x)
+    point[:] = begin
+    return thorough

@@ -119,8 +119,16 @@ def find_primer_flight(problem: LandingProblem, time: float | None = None) -> Pr
     return None if flight is None or flight.broken else flight
 
 
-def find_extremal_flight(problem: LandingProblem, time: float | None = None) -> PrimerFlight | None:
-    """The same, and a flight too that breaks a limit of the problem or overdraws the tank: it says which."""
+def find_extremal_flight(
+    problem: LandingProblem, time: float | None = None, thorough: bool = True
+) -> PrimerFlight | None:
+    """The same, and a flight too that breaks a limit of the problem or overdraws the tank: it says which.
+
+    Args:
+        problem: the landing problem.
+        time: [s] of flight; None for the best one.
+        thorough: whether easier problems may lead there (`continuation`), and a touch at a given time.
+    """
     lander = problem.lander
     if lander.min_thrust > 0.0 or not problem.ends_at_rest or problem.rotates:
         return None
@@ -131,16 +139,17 @@ def find_extremal_flight(problem: LandingProblem, time: float | None = None) -> 
     flight = _read(problem, scaled, x, _seek(scaled, vehicle, held, x))
     if flight is not None and flight.broken != ALTITUDE:
         return flight
-    if find_ground_contact(problem) is not None:
+    if (time is not None and not thorough) or find_ground_contact(problem) is not None:
         return flight
-    for seek in () if flight is not None else (_seek_full_burn, _seek_from_impulses):
+    seeks = (_seek_full_burn, _seek_from_impulses) if thorough else (_seek_full_burn,)
+    for seek in () if flight is not None else seeks:
         x = blank_extremal()
         flight = _read(problem, scaled, x, seek(scaled, vehicle, held, x))
         if flight is not None:
             break
     if flight is not None and flight.broken != ALTITUDE:
         return flight
-    for seek in (_seek_touching, _seek_from_edge):
+    for seek in (_seek_touching, _seek_from_edge) if thorough else (_seek_touching,):
         x = blank_extremal()
         touching = _read(problem, scaled, x, seek(scaled, vehicle, held, x))
         if touching is not None and touching.broken != ALTITUDE:

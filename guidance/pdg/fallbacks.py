@@ -261,7 +261,8 @@ def _plan_nearest_without_solver(request: Request) -> Plan | None:
         plan = plan_nearest_indirect(problem, request.nodes, request.nearest)
         if plan.status.has_flight and (request.provisional or plan.keeps_limits):
             return plan
-        proof, method = prove_no_landing_anywhere(problem, window), "dual bound"
+        proof = None if request.provisional else prove_no_landing_anywhere(problem, window)
+        method = "dual bound"
     if proof is None:
         return None
     words = f"{_NOWHERE} (limits: {', '.join(proof.causes)})"

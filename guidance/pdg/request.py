@@ -42,7 +42,7 @@ class Request:
         """What the indirect method finds, whether or not it breaks a limit."""
         if self.landing_error_weight is not None:
             return None
-        return find_extremal_flight(self.problem, self.time_of_flight)
+        return find_extremal_flight(self.problem, self.time_of_flight, not self.provisional)
 
     @property
     def flight(self) -> PrimerFlight | None:
@@ -54,7 +54,7 @@ class Request:
         """What the indirect method finds near a target that is out of reach; None where it is not asked."""
         if self.method != "auto" or self.time_of_flight is not None or self.extremal is None:
             return None
-        return find_nearest_landing(self.problem, self.extremal)
+        return find_nearest_landing(self.problem, self.extremal, not self.provisional)
 
     @property
     def bounds_first(self) -> bool:
