@@ -13,7 +13,11 @@ import numpy as np
 
 from guidance.arrays import Array
 from guidance.descent.problem import LandingProblem
-from guidance.flight_time.continuation import solve_from_impulses, solve_touching_from_edge
+from guidance.flight_time.continuation import (
+    solve_from_impulses,
+    solve_primer_at,
+    solve_touching_from_edge,
+)
 from guidance.flight_time.extremal import (
     Extremal,
     PrimerProblem,
@@ -21,7 +25,6 @@ from guidance.flight_time.extremal import (
     fly_extremal,
     set_direction,
 )
-from guidance.flight_time.fixed_time import solve_primer_at
 from guidance.flight_time.full_burn import solve_full_burn
 from guidance.flight_time.ground_contact import find_ground_contact
 from guidance.flight_time.path_limits import (
