@@ -13,7 +13,15 @@ from __future__ import annotations
 
 import math
 
-from guidance.flight_time.extremal import Extremal, PrimerProblem, copy_extremal, new_extremal, touches
+from guidance.flight_time.extremal import (
+    LEGS,
+    Extremal,
+    PrimerProblem,
+    copy_extremal,
+    fly_extremal,
+    new_extremal,
+    touches,
+)
 from guidance.flight_time.first_guess import guess_impulses, guess_touch
 from guidance.flight_time.linear_system import dot
 from guidance.flight_time.primer_equations import (
@@ -147,6 +155,49 @@ def solve_touching_from_edge(problem: PrimerProblem, x: Extremal) -> bool:
         after = max(left - step, 0.0)
         copy_extremal(x, trial)
         if solve_from(trial, _lower(problem, edge, math.exp(-after)), TOUCHING):
+            copy_extremal(trial, x)
+            left, step = after, _LONGER * step
+        else:
+            step *= _SHORTER
+    return left == 0.0
+
+
+@compile_kernel
+def _set_lowest(problem: PrimerProblem, x: Extremal) -> bool:
+    """Write the touch of the altitude that the first burn of an extremal comes down to; whether it does."""
+    path = fly_extremal(x, problem)
+    for k in range(LEGS):
+        before, after = path.velocity[k, 2], path.velocity[k + 1, 2]
+        if before < 0.0 <= after:
+            share, part = before / (before - after), x.times[0] / LEGS
+            x.touch[0], x.touch[1] = (k + share) * part, 0.0
+            x.touch[2] = path.position[k, 2] + 0.5 * share * share * part * before
+            return x.touch[2] < 0.0
+    return False
+
+
+@compile_kernel
+def raise_touch(problem: PrimerProblem, size: int, x: Extremal) -> bool:
+    """Find an extremal that touches the target's altitude in its first burn, from one that cuts through it.
+
+    It touches the lowest altitude that it comes down to, which is raised to the target's.
+
+    Args:
+        problem: in seconds, as `PrimerProblem` says.
+        size: TOUCHING or TOUCHING_HELD.
+        x: the extremal that cuts through the ground, in seconds; the answer.
+
+    Returns:
+        Whether it was found, as of `solve_touching`.
+    """
+    if not x.times[0] > 0.0 or not _set_lowest(problem, x):
+        return False
+    depth, left, step, trial = x.touch[2], 1.0, 0.5, new_extremal()
+    while left > 0.0 and step > _SHORTEST:
+        after = max(left - step, 0.0)
+        copy_extremal(x, trial)
+        trial.touch[2] = depth * after
+        if solve_from(trial, problem, size):
             copy_extremal(trial, x)
             left, step = after, _LONGER * step
         else:

@@ -14,6 +14,7 @@ import numpy as np
 from guidance.arrays import Array
 from guidance.descent.problem import LandingProblem
 from guidance.flight_time.continuation import (
+    raise_touch,
     solve_from_impulses,
     solve_primer_at,
     solve_touching_from_edge,
@@ -22,6 +23,7 @@ from guidance.flight_time.extremal import (
     Extremal,
     PrimerProblem,
     blank_extremal,
+    copy_extremal,
     fly_extremal,
     set_direction,
 )
@@ -37,7 +39,13 @@ from guidance.flight_time.path_limits import (
     judge_extremal,
     path_limits,
 )
-from guidance.flight_time.primer_equations import solve_from, solve_primer, solve_touching
+from guidance.flight_time.primer_equations import (
+    TOUCHING,
+    TOUCHING_HELD,
+    solve_from,
+    solve_primer,
+    solve_touching,
+)
 from guidance.kernel import compile_kernel
 
 _NOT_FOUND = -1
@@ -157,6 +165,12 @@ def find_extremal_flight(
         touching = _read(problem, scaled, x, seek(scaled, vehicle, held, x))
         if touching is not None and touching.broken != ALTITUDE:
             return touching
+    if flight is not None and thorough:
+        x = blank_extremal()
+        copy_extremal(flight.extremal, x)
+        touching = _read(problem, scaled, x, _seek_by_raising(scaled, vehicle, held, x))
+        if touching is not None and touching.broken != ALTITUDE:
+            return touching
     return flight
 
 
@@ -213,6 +227,13 @@ def _seek_touching(problem: PrimerProblem, vehicle: _Vehicle, time: float, x: Ex
 def _seek_from_edge(problem: PrimerProblem, vehicle: _Vehicle, time: float, x: Extremal) -> int:
     """The same for one that touches the ground and that only lower starts lead to."""
     found = solve_touching_from_edge(problem, x) and (math.isnan(time) or solve_primer_at(time, problem, x))
+    return judge_extremal(x, problem, *vehicle) if found and x.touch[1] > 0.0 else _NOT_FOUND
+
+
+@compile_kernel
+def _seek_by_raising(problem: PrimerProblem, vehicle: _Vehicle, time: float, x: Extremal) -> int:
+    """The same from the extremal that cuts through the ground."""
+    found = raise_touch(problem, TOUCHING if math.isnan(time) else TOUCHING_HELD, x)
     return judge_extremal(x, problem, *vehicle) if found and x.touch[1] > 0.0 else _NOT_FOUND
 
 

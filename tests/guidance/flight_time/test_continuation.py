@@ -7,9 +7,14 @@ from descents import GRAVITY, TARGET, harsh_start, paper_start
 import guidance
 from guidance import PAPER_LANDER, PlanStatus, State
 from guidance.descent.problem import LandingProblem
-from guidance.flight_time.continuation import solve_from_impulses, solve_touching_from_edge
-from guidance.flight_time.extremal import Extremal, blank_extremal
-from guidance.flight_time.primer_equations import solve_primer, solve_touching
+from guidance.flight_time.continuation import (
+    raise_touch,
+    solve_from_impulses,
+    solve_touching_from_edge,
+)
+from guidance.flight_time.extremal import Extremal, blank_extremal, fly_extremal
+from guidance.flight_time.path_limits import burnt_share
+from guidance.flight_time.primer_equations import TOUCHING, solve_primer, solve_touching
 from guidance.flight_time.primer_vector import scale_landing
 
 BY_MORE_THRUST = [
@@ -26,6 +31,13 @@ FROM_LOWER_STARTS = [
 ]
 
 
+FROM_BELOW = [
+    [-4.4, 63.4, 116.3, -1.0, -16.3, -33.5, 1179.5],
+    [-144.9, 58.7, 145.5, 22.6, -8.9, -40.1, 1196.1],
+]
+"""Their extremals that ignore the ground cut through it; nothing else leads to those that touch it."""
+
+
 def scaled(start):
     return scale_landing(LandingProblem(State.parse(start), TARGET, PAPER_LANDER, GRAVITY))
 
@@ -34,7 +46,7 @@ def numbers(x: Extremal):
     return np.concatenate([x.primer.ravel(), x.times, np.where(np.isfinite(x.touch), x.touch, 0.0)])
 
 
-@pytest.mark.parametrize("start", [*BY_MORE_THRUST, *FROM_LOWER_STARTS])
+@pytest.mark.parametrize("start", [*BY_MORE_THRUST, *FROM_LOWER_STARTS, *FROM_BELOW])
 def test_the_cones_find_the_same_flight_on_a_fine_mesh(start):
     plan = guidance.solve_pdg(start, TARGET)
     convex = guidance.solve_pdg(start, TARGET, method="convex", nodes=201)
@@ -58,6 +70,32 @@ def test_no_first_guess_touches_the_ground_there_and_lower_starts_lead_to_one_th
     assert not solve_touching(scaled(start), x)
     assert solve_touching_from_edge(scaled(start), x)
     assert x.touch[1] > 0.0
+
+
+@pytest.mark.parametrize("start", FROM_BELOW)
+def test_an_extremal_that_cuts_through_the_ground_is_raised_until_it_touches_it(start):
+    problem, x = scaled(start), blank_extremal()
+    assert solve_primer(problem, x)
+    free = burnt_share(x, problem.mass_flow)
+    assert raise_touch(problem, TOUCHING, x)
+    assert x.touch[1] > 0.0
+    assert burnt_share(x, problem.mass_flow) > free
+    assert fly_extremal(x, problem).position[:, 2].min() > -1e-9
+    assert not solve_touching(problem, blank_extremal())
+    assert not raise_touch(problem, TOUCHING, x)  # it does not cut through any more
+    assert guidance.solve_pdg(start, TARGET).optimality_gap < 0.02
+
+
+def test_raised_or_guessed_it_is_the_same_touch():
+    rng, compared = np.random.default_rng(6), 0
+    for _ in range(400):
+        problem, known, other = scaled(harsh_start(rng)), blank_extremal(), blank_extremal()
+        if not (solve_touching(problem, known) and known.touch[1] > 0.0 and solve_primer(problem, other)):
+            continue
+        if raise_touch(problem, TOUCHING, other):
+            compared += 1
+            np.testing.assert_allclose(numbers(other), numbers(known), rtol=1e-4, atol=1e-4)
+    assert compared >= 5
 
 
 def test_both_ways_lead_to_the_extremal_that_a_first_guess_finds():
