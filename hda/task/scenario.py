@@ -14,7 +14,7 @@ from guidance.state import State
 from hda.ground.library import FRESH_SPLIT, Ground, load_tile, tile_numbers
 from hda.ground.tile import Tile
 from hda.navigation.sensor_errors import SensorErrors, draw_sensor_errors
-from hda.safety.touchdown_stance import NO_GROUND, Footing, make_footing
+from hda.safety.touchdown_stance import Footing, make_footing
 from hda.task.first_target import describe_lack, draw_target, offers_targets
 from hda.task.observation import ScenarioView
 from hda.task.presets import Preset, find_preset
@@ -79,11 +79,11 @@ class Scenario:
         )
 
     @property
-    def footing(self) -> Footing:
-        """The lander over the true ground; without ground where flights end on the plane."""
+    def footing(self) -> Footing | None:
+        """The lander over the true ground; None where flights end on the plane."""
         stance = self.preset.stance
         if stance is None:
-            return NO_GROUND
+            return None
         return make_footing(self.tile.elevation, stance, float(self.nominal_target[2]))
 
 
