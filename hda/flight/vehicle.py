@@ -134,7 +134,7 @@ def fly_over(
     time, path, commanded = np.empty(periods + 2), np.empty((periods + 2, 7)), np.empty((periods + 1, 3))
     plane, vehicle = float(decision.site[2]), _vehicle_limits(lander)
     gravity, ground = surroundings.gravity, surroundings.footing
-    footing = None if ground is None else tuple(ground)
+    footing = None if ground is None else (*ground,)
     sensing = None if errors.sensing is None else plain_sensing(errors.sensing)
     believed = errors.navigation.copy()
     conditions = (interval.period, plane, gravity, vehicle, errors.thrust, believed, footing, sensing)

@@ -6,30 +6,22 @@ Nothing that is shown here is written anywhere: the products are made from the f
 from __future__ import annotations
 
 import os
-from contextlib import suppress
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
-from time import perf_counter
 
 from rich.console import Console
 from rich.table import Table
 
-from guidance.kernel import kernel_folder
-from hda.registry import policy_entry
 from studies.campaign.executor import OpenExecutor
-from studies.campaign.monte_carlo import Chunk, Study, fly_chunk, prepare_study
+from studies.campaign.monte_carlo import Chunk, prepare_study
 from studies.campaign.points import describe_left_out, describe_retry, find_missing, fly_missing
 from studies.campaign.score import MEASURE_COLUMNS, RATIO_COLUMNS, RunningScore
 from studies.campaign.study_folder import StudyFolder
 from studies.columns import document_cell
 from studies.compare.display import Phase, show_phase
+from studies.compare.rehearsal import LOADING_SECONDS, is_compiled, rehearse
 from studies.statistics.ratios import wilson_interval
 
-COMPILING_SECONDS = 40.0
-"""[s] about what compiling takes, once for a version of the code; for the display alone."""
-LOADING_SECONDS = 5.0
-"""[s] about what loading compiled code takes."""
 _FEW_CHUNKS = 2  # so few fly sooner than they are rehearsed
 _COLUMNS = [
     replace(column, by_tile=None)
@@ -58,7 +50,7 @@ def fly_comparison(folder: StudyFolder, open_executor: OpenExecutor, here: bool,
     if here:
         prepare_study(study, workers)
         if len(missing) > _FEW_CHUNKS or not is_compiled(study):
-            seconds = rehearse(study, console)
+            seconds = rehearse(study, console, workers)
     lacking = sum(last - first for first, last in missing)
     kept = study.episodes - lacking
     at_once = min(workers, os.cpu_count() or 1)
@@ -82,53 +74,6 @@ def fly_comparison(folder: StudyFolder, open_executor: OpenExecutor, here: bool,
                     display.print(words)
 
         fly_missing(folder, missing, open_executor, workers, tell)
-
-
-def rehearse(study: Study, console: Console) -> float:
-    """Fly the first episode twice with each policy in this process, so that all code is compiled.
-
-    Slow policies are left out. Workers then load what was compiled here, each kernel once.
-
-    Returns:
-        [s] about what an episode of all policies takes, compiled.
-
-    Raises:
-        PolicyError: a policy raised something.
-    """
-    ready = is_compiled(study)
-    title = "loading compiled code" if ready else "compiling, once for this version of the code"
-    expected = LOADING_SECONDS if ready else COMPILING_SECONDS
-    seconds = 0.0
-    names = [name for name in study.policies if not policy_entry(name).slow]
-    with show_phase(console, Phase(title, len(names), expected, steady=False)) as display:
-        for name in names:
-            alone = replace(study, policies=(name,))
-            fly_chunk(alone, 0, 1)
-            began = perf_counter()
-            fly_chunk(alone, 0, 1)
-            seconds += perf_counter() - began
-            display.advance(1)
-    with suppress(OSError):  # nowhere to write: nothing is kept there either
-        kernel_folder().mkdir(parents=True, exist_ok=True)
-        _flown_before().write_text("".join(f"{name}\n" for name in sorted({*_read_flown(), *names})))
-    return seconds
-
-
-def is_compiled(study: Study) -> bool:
-    """Whether each policy has flown at these sources on this machine: what is left is to load its code."""
-    return {name for name in study.policies if not policy_entry(name).slow} <= _read_flown()
-
-
-def _flown_before() -> Path:
-    """Names of the policies that a rehearsal flew, beside the code that it compiled."""
-    return kernel_folder() / "rehearsed.txt"
-
-
-def _read_flown() -> set[str]:
-    try:
-        return set(_flown_before().read_text().split())
-    except (OSError, UnicodeError):
-        return set()
 
 
 def _table_so_far(running: dict[str, RunningScore]) -> Table:
