@@ -69,14 +69,7 @@ class Scenario:
     @property
     def view(self) -> ScenarioView:
         """What a policy may know of it."""
-        return ScenarioView(
-            lander=self.preset.lander,
-            gravity=np.array(self.preset.gravity),
-            nominal_target=self.nominal_target.copy(),
-            rules=self.preset.rules,
-            lidar=self.preset.lidar,
-            criteria=self.preset.criteria,
-        )
+        return view_of_preset(self.preset, self.nominal_target)
 
     @property
     def footing(self) -> Footing | None:
@@ -85,6 +78,18 @@ class Scenario:
         if stance is None:
             return None
         return make_footing(self.tile.elevation, stance, float(self.nominal_target[2]))
+
+
+def view_of_preset(preset: Preset, nominal_target: Array) -> ScenarioView:
+    """What a policy may know of an episode on a preset, with its first target [m], shape (3,)."""
+    return ScenarioView(
+        lander=preset.lander,
+        gravity=np.array(preset.gravity),
+        nominal_target=nominal_target.copy(),
+        rules=preset.rules,
+        lidar=preset.lidar,
+        criteria=preset.criteria,
+    )
 
 
 def ground_point(scenario: Scenario, site: Array) -> Array:

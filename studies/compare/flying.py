@@ -48,9 +48,13 @@ def fly_comparison(folder: StudyFolder, open_executor: OpenExecutor, here: bool,
         return
     seconds = None
     if here:
-        prepare_study(study, workers)
-        if len(missing) > _FEW_CHUNKS or not is_compiled(study):
+        ready = is_compiled(study)
+        if ready:
+            prepare_study(study, workers)
+        if len(missing) > _FEW_CHUNKS or not ready:
             seconds = rehearse(study, console, workers)
+        if not ready:
+            prepare_study(study, workers)  # the rehearsal has compiled its kernels too, in one process
     lacking = sum(last - first for first, last in missing)
     kept = study.episodes - lacking
     at_once = min(workers, os.cpu_count() or 1)

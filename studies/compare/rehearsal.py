@@ -14,6 +14,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import Literal
 
+import numpy as np
 from rich.console import Console
 
 from guidance.kernel import kernel_folder
@@ -21,7 +22,7 @@ from hda.flight.episode import inform_pilot
 from hda.policies.composition import ComposedPolicy, PrivilegedComposition
 from hda.policies.zem_zev import FixedGainZemZev
 from hda.registry import policy_entry
-from hda.task.scenario import sample_scenario
+from hda.task.scenario import sample_scenario, view_of_preset
 from hda.worker_pool import map_in_processes
 from studies.campaign.monte_carlo import Study, fly_chunk
 from studies.compare.display import Phase, show_phase
@@ -97,7 +98,7 @@ def list_parts(study: Study) -> list[PolicyPart]:
 
     The law that plans takes longest and is first. Other laws share most of its code, and come last, so that
     they find it compiled. A flight of a policy that is no composition, or is flown by ZEM/ZEV, compiles the
-    vehicle; one such composition is enough.
+    vehicle, and the ground unless there are tiles already; one such composition is enough.
     """
     laws: dict[str, PolicyPart] = {}
     sites: dict[str, PolicyPart] = {}
@@ -124,10 +125,15 @@ def _make_ready(study: Study, part: PolicyPart) -> None:
         if part.kind == "flight":
             fly_chunk(replace(study, policies=(part.policy,)), 0, 1)
             return
+        policy = study.make_policy(part.policy)
+        assert isinstance(policy, ComposedPolicy | PrivilegedComposition)
+        if part.kind == "law":  # it needs no ground, which another process may be building
+            policy.guidance_law.begin(view_of_preset(study.preset, np.zeros(3)))
+            return
         scenario = sample_scenario(study.preset, study.study_seed, 0, study.split)
-        pilot = inform_pilot(study.make_policy(part.policy), scenario)
+        pilot = inform_pilot(policy, scenario)
         assert isinstance(pilot, ComposedPolicy)
-        (pilot.guidance_law if part.kind == "law" else pilot.site_selection).begin(scenario.view)
+        pilot.site_selection.begin(scenario.view)
 
 
 def _use_one_thread() -> None:
