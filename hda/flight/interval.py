@@ -181,6 +181,11 @@ def _estimate_error(
     return along * mean_mass / square - 1.0
 
 
+def plain_footing(footing: Footing) -> _PlainFooting:
+    """Take the names away."""
+    return footing.elevation, footing.pads, footing.pad_radius, footing.clearance, footing.plane
+
+
 @compile_kernel
 def _name_footing(plain: _PlainFooting | None) -> Footing | None:
     if plain is None:

@@ -19,7 +19,7 @@ from guidance.lander import Lander
 from guidance.state import State
 from guidance.thrust_limits import pointing_angle
 from hda.flight import held_thrust
-from hda.flight.interval import enter_plan, enter_zem_zev
+from hda.flight.interval import enter_plan, enter_zem_zev, plain_footing
 from hda.navigation.steering import Sensing, plain_sensing
 from hda.policy import Decision, ZemZevCommand
 from hda.safety.touchdown_stance import Footing
@@ -134,7 +134,7 @@ def fly_over(
     time, path, commanded = np.empty(periods + 2), np.empty((periods + 2, 7)), np.empty((periods + 1, 3))
     plane, vehicle = float(decision.site[2]), _vehicle_limits(lander)
     gravity, ground = surroundings.gravity, surroundings.footing
-    footing = None if ground is None else (*ground,)
+    footing = None if ground is None else plain_footing(ground)
     sensing = None if errors.sensing is None else plain_sensing(errors.sensing)
     believed = errors.navigation.copy()
     conditions = (interval.period, plane, gravity, vehicle, errors.thrust, believed, footing, sensing)

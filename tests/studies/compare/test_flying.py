@@ -15,7 +15,7 @@ from hda.registry import policy_entry
 from hda.task.presets import PRESETS
 from studies.campaign.monte_carlo import PolicyError, Study
 from studies.compare.command import Comparison, compare
-from studies.compare.flying import is_compiled, rehearse
+from studies.compare.rehearsal import is_compiled, rehearse
 
 RAISES = "tests.studies.compare.test_flying:Raising"
 
@@ -42,7 +42,7 @@ def test_a_rehearsal_says_what_an_episode_takes(capsys: pytest.CaptureFixture[st
 
 
 def test_code_of_a_policy_counts_once_it_has_flown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("studies.compare.flying.kernel_folder", lambda: tmp_path / "kernels")
+    monkeypatch.setattr("studies.compare.rehearsal.kernel_folder", lambda: tmp_path / "kernels")
     both = Study(PRESETS["paper"], ("no-divert", "single-divert", "nearest-safe+casadi"), 50)
     assert not is_compiled(both)
     rehearse(replace(both, policies=("no-divert",)), Console())
