@@ -27,7 +27,7 @@ from hda.worker_pool import map_in_processes
 from studies.campaign.monte_carlo import Study, fly_chunk
 from studies.compare.display import Phase, show_phase
 
-COMPILING_SECONDS = 40.0
+COMPILING_SECONDS = 25.0
 """[s] about what compiling takes, once for a version of the code; for the display alone."""
 LOADING_SECONDS = 5.0
 """[s] about what loading compiled code takes."""

@@ -5,13 +5,12 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from guidance.kernel import kernel_folder
 from hda import registry
 from hda.registry import policy_entry, policy_names
 from hda.task.presets import PRESETS
 from studies.campaign.monte_carlo import PolicyError, Study
 from studies.compare.quick import QUICK_POLICIES
-from studies.compare.rehearsal import PolicyPart, is_compiled, list_parts, rehearse
+from studies.compare.rehearsal import PolicyPart, list_parts, rehearse
 from tests.studies.compare.test_flying import RAISES
 
 
@@ -30,23 +29,6 @@ def test_every_policy_has_a_part_and_no_part_comes_twice():
     assert parts[0].kind == parts[-1].kind == "law"
     begun = {part.policy for part in parts}
     assert {"no-divert", "hazard-aware", "deferred-decision", "oracle-fuel", "td3"} <= begun
-
-
-@pytest.mark.slow
-def test_processes_compile_the_parts_before_the_flights(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setenv("LUNAR_HDA_CACHE", str(tmp_path))
-    study = Study(PRESETS["paper"], ("no-divert", "nearest-safe"), 50, split="fresh")
-    monkeypatch.setattr("os.cpu_count", lambda: 2)
-    assert rehearse(study, Console(), workers=2) > 0.0
-    assert is_compiled(study)
-    shown = capsys.readouterr().out.splitlines()
-    assert shown[0].startswith("compiling, once for this version of the code (about ")
-    assert shown[-1].startswith("compiling, once for this version of the code: 5/5, ")
-    files = {path.name: path.stat().st_mtime_ns for path in kernel_folder().rglob("*.nbc")}
-    assert any("enter_zem_zev" in name for name in files)
-    assert not any("range_down" in name or "find_contact" in name for name in files)  # paper needs neither
 
 
 @pytest.mark.slow
