@@ -6,22 +6,30 @@ Nothing that is shown here is written anywhere: the products are made from the f
 from __future__ import annotations
 
 import os
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
+from time import perf_counter
 
 from rich.console import Console
 from rich.table import Table
 
+from guidance.kernel import kernel_folder
 from studies.campaign.executor import OpenExecutor
-from studies.campaign.monte_carlo import Chunk, prepare_study
+from studies.campaign.monte_carlo import Chunk, Study, fly_chunk, prepare_study
 from studies.campaign.points import describe_left_out, describe_retry, find_missing, fly_missing
+from studies.campaign.policy_parts import compile_parts, list_parts, quick_policies
 from studies.campaign.score import MEASURE_COLUMNS, RATIO_COLUMNS, RunningScore
 from studies.campaign.study_folder import StudyFolder
 from studies.columns import document_cell
 from studies.compare.display import Phase, show_phase
-from studies.compare.rehearsal import LOADING_SECONDS, is_compiled, rehearse
 from studies.statistics.ratios import wilson_interval
 
+COMPILING_SECONDS = 25.0
+"""[s] about what compiling takes, once for a version of the code; for the display alone."""
+LOADING_SECONDS = 5.0
+"""[s] about what loading compiled code takes."""
 _FEW_CHUNKS = 2  # so few fly sooner than they are rehearsed
 _COLUMNS = [
     replace(column, by_tile=None)
@@ -78,6 +86,63 @@ def fly_comparison(folder: StudyFolder, open_executor: OpenExecutor, here: bool,
                     display.print(words)
 
         fly_missing(folder, missing, open_executor, workers, tell)
+
+
+def rehearse(study: Study, console: Console, workers: int = 1) -> float:
+    """Fly the first episode twice with each policy in this process, so that all code is compiled.
+
+    Slow policies are left out. Where nothing is compiled yet and there are several workers, they compile the
+    parts of the policies before. Workers of the flights then load what was compiled here, each kernel once.
+
+    Args:
+        study: what is going to be flown.
+        console: where it is shown.
+        workers: processes.
+
+    Returns:
+        [s] about what an episode of all policies takes, compiled.
+
+    Raises:
+        PolicyError: a policy raised something.
+    """
+    ready, names = is_compiled(study), quick_policies(study)
+    at_once = min(workers, os.cpu_count() or 1)
+    parts = [] if ready or at_once == 1 else list_parts(study)
+    title = "loading compiled code" if ready else "compiling, once for this version of the code"
+    expected = LOADING_SECONDS if ready else COMPILING_SECONDS
+    seconds = 0.0
+    phase = Phase(title, len(parts) + len(names), expected, steady=False)
+    with show_phase(console, phase) as display:
+        if parts:
+            compile_parts(study, parts, at_once, partial(display.advance, 1))
+        for name in names:
+            alone = replace(study, policies=(name,))
+            fly_chunk(alone, 0, 1)
+            began = perf_counter()
+            fly_chunk(alone, 0, 1)
+            seconds += perf_counter() - began
+            display.advance(1)
+    with suppress(OSError):  # nowhere to write: nothing is kept there either
+        kernel_folder().mkdir(parents=True, exist_ok=True)
+        _flown_before().write_text("".join(f"{name}\n" for name in sorted({*_read_flown(), *names})))
+    return seconds
+
+
+def is_compiled(study: Study) -> bool:
+    """Whether each policy has flown at these sources on this machine: what is left is to load its code."""
+    return set(quick_policies(study)) <= _read_flown()
+
+
+def _flown_before() -> Path:
+    """Names of the policies that a rehearsal flew, beside the code that it compiled."""
+    return kernel_folder() / "rehearsed.txt"
+
+
+def _read_flown() -> set[str]:
+    try:
+        return set(_flown_before().read_text().split())
+    except (OSError, UnicodeError):
+        return set()
 
 
 def _table_so_far(running: dict[str, RunningScore]) -> Table:

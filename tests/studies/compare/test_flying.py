@@ -15,7 +15,7 @@ from hda.registry import policy_entry
 from hda.task.presets import PRESETS
 from studies.campaign.monte_carlo import PolicyError, Study
 from studies.compare.command import Comparison, compare
-from studies.compare.rehearsal import is_compiled, rehearse
+from studies.compare.flying import is_compiled, rehearse
 
 RAISES = "tests.studies.compare.test_flying:Raising"
 
@@ -42,7 +42,7 @@ def test_a_rehearsal_says_what_an_episode_takes(capsys: pytest.CaptureFixture[st
 
 
 def test_code_of_a_policy_counts_once_it_has_flown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("studies.compare.rehearsal.kernel_folder", lambda: tmp_path / "kernels")
+    monkeypatch.setattr("studies.compare.flying.kernel_folder", lambda: tmp_path / "kernels")
     both = Study(PRESETS["paper"], ("no-divert", "single-divert", "nearest-safe+casadi"), 50)
     assert not is_compiled(both)
     rehearse(replace(both, policies=("no-divert",)), Console())
@@ -104,3 +104,16 @@ def test_the_first_run_on_a_machine_says_that_it_compiles(tmp_path: Path) -> Non
     compiled = {path.name for path in (tmp_path / "cache" / "kernels").rglob("*.nbc")}
     assert any("enter_zem_zev" in name for name in compiled)
     assert not any("range_down" in name or "find_contact" in name for name in compiled)  # paper needs neither
+
+
+@pytest.mark.slow
+def test_a_policy_that_fails_in_a_process_is_named_by_its_flight(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(registry, "REGISTRY", registry.REGISTRY.copy())
+    monkeypatch.setattr("studies.compare.flying.kernel_folder", lambda: tmp_path)
+    monkeypatch.setattr("os.cpu_count", lambda: 2)
+    policy_entry(RAISES)
+    study = Study(PRESETS["paper"], ("no-divert", "raising"), 50, paths=(RAISES,))
+    with pytest.raises(PolicyError, match=r"policy 'raising' failed in episode 0 .* no idea"):
+        rehearse(study, Console(), workers=2)

@@ -1,4 +1,4 @@
-"""Code compiled before the flights: parts of the policies side by side in processes, then a flight of each.
+"""The parts of a study's policies, whose code processes compile side by side before the flights.
 
 Compiled code is kept on the disk (`guidance.kernel`), so that what one process compiled the others load. A
 planner, the prices of sites and the vehicle share little of it and take about as long as each other.
@@ -6,18 +6,14 @@ planner, the prices of sites and the vehicle share little of it and take about a
 
 from __future__ import annotations
 
-import os
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path
-from time import perf_counter
 from typing import Literal
 
 import numpy as np
-from rich.console import Console
 
-from guidance.kernel import kernel_folder
 from hda.flight.episode import inform_pilot
 from hda.policies.composition import ComposedPolicy, PrivilegedComposition
 from hda.policies.zem_zev import FixedGainZemZev
@@ -25,12 +21,6 @@ from hda.registry import policy_entry
 from hda.task.scenario import sample_scenario, view_of_preset
 from hda.worker_pool import map_in_processes
 from studies.campaign.monte_carlo import Study, fly_chunk
-from studies.compare.display import Phase, show_phase
-
-COMPILING_SECONDS = 25.0
-"""[s] about what compiling takes, once for a version of the code; for the display alone."""
-LOADING_SECONDS = 5.0
-"""[s] about what loading compiled code takes."""
 
 
 @dataclass(frozen=True)
@@ -47,50 +37,9 @@ class PolicyPart:
     kind: Literal["law", "site", "flight"]
 
 
-def rehearse(study: Study, console: Console, workers: int = 1) -> float:
-    """Fly the first episode twice with each policy in this process, so that all code is compiled.
-
-    Slow policies are left out. Where nothing is compiled yet and there are several workers, they compile the
-    parts of the policies before. Workers of the flights then load what was compiled here, each kernel once.
-
-    Args:
-        study: what is going to be flown.
-        console: where it is shown.
-        workers: processes.
-
-    Returns:
-        [s] about what an episode of all policies takes, compiled.
-
-    Raises:
-        PolicyError: a policy raised something.
-    """
-    ready, names = is_compiled(study), _rehearsed(study)
-    at_once = min(workers, os.cpu_count() or 1)
-    parts = [] if ready or at_once == 1 else list_parts(study)
-    title = "loading compiled code" if ready else "compiling, once for this version of the code"
-    expected = LOADING_SECONDS if ready else COMPILING_SECONDS
-    seconds = 0.0
-    phase = Phase(title, len(parts) + len(names), expected, steady=False)
-    with show_phase(console, phase) as display:
-        if parts:
-            make_ready = partial(_make_ready, study)
-            map_in_processes(make_ready, parts, at_once, _use_one_thread, partial(display.advance, 1))
-        for name in names:
-            alone = replace(study, policies=(name,))
-            fly_chunk(alone, 0, 1)
-            began = perf_counter()
-            fly_chunk(alone, 0, 1)
-            seconds += perf_counter() - began
-            display.advance(1)
-    with suppress(OSError):  # nowhere to write: nothing is kept there either
-        kernel_folder().mkdir(parents=True, exist_ok=True)
-        _flown_before().write_text("".join(f"{name}\n" for name in sorted({*_read_flown(), *names})))
-    return seconds
-
-
-def is_compiled(study: Study) -> bool:
-    """Whether each policy has flown at these sources on this machine: what is left is to load its code."""
-    return set(_rehearsed(study)) <= _read_flown()
+def quick_policies(study: Study) -> list[str]:
+    """The policies of a study that are not slow."""
+    return [name for name in study.policies if not policy_entry(name).slow]
 
 
 def list_parts(study: Study) -> list[PolicyPart]:
@@ -103,7 +52,7 @@ def list_parts(study: Study) -> list[PolicyPart]:
     laws: dict[str, PolicyPart] = {}
     sites: dict[str, PolicyPart] = {}
     flights: dict[str, PolicyPart] = {}
-    for name in _rehearsed(study):
+    for name in quick_policies(study):
         policy = study.make_policy(name)
         if not isinstance(policy, ComposedPolicy | PrivilegedComposition):
             flights[name] = PolicyPart(name, "flight")
@@ -117,6 +66,20 @@ def list_parts(study: Study) -> list[PolicyPart]:
         sites.setdefault(site, PolicyPart(name, "site"))
     planned, flown = list(laws.values()), list(flights.values())
     return [*planned[:1], *flown[:1], *sites.values(), *flown[1:], *planned[1:]]
+
+
+def compile_parts(
+    study: Study, parts: Sequence[PolicyPart], workers: int, on_done: Callable[[], None]
+) -> None:
+    """Compile parts in several processes.
+
+    Args:
+        study: whose they are.
+        parts: of `list_parts`.
+        workers: processes.
+        on_done: called after each part.
+    """
+    map_in_processes(partial(_make_ready, study), parts, workers, _use_one_thread, on_done)
 
 
 def _make_ready(study: Study, part: PolicyPart) -> None:
@@ -140,20 +103,3 @@ def _use_one_thread() -> None:
     import numba
 
     numba.set_num_threads(1)
-
-
-def _rehearsed(study: Study) -> list[str]:
-    """The policies that are flown here: those that are not slow."""
-    return [name for name in study.policies if not policy_entry(name).slow]
-
-
-def _flown_before() -> Path:
-    """Names of the policies that a rehearsal flew, beside the code that it compiled."""
-    return kernel_folder() / "rehearsed.txt"
-
-
-def _read_flown() -> set[str]:
-    try:
-        return set(_flown_before().read_text().split())
-    except (OSError, UnicodeError):
-        return set()

@@ -1,17 +1,10 @@
-"""What a rehearsal compiles side by side: every part once, and what fails there is told by the flights."""
+"""What is compiled side by side: every part once, the longest first."""
 
-from pathlib import Path
-
-import pytest
-from rich.console import Console
-
-from hda import registry
 from hda.registry import policy_entry, policy_names
 from hda.task.presets import PRESETS
-from studies.campaign.monte_carlo import PolicyError, Study
+from studies.campaign.monte_carlo import Study
+from studies.campaign.policy_parts import PolicyPart, list_parts
 from studies.compare.quick import QUICK_POLICIES
-from studies.compare.rehearsal import PolicyPart, list_parts, rehearse
-from tests.studies.compare.test_flying import RAISES
 
 
 def test_the_planner_is_begun_first_and_the_vehicle_beside_it():
@@ -29,16 +22,3 @@ def test_every_policy_has_a_part_and_no_part_comes_twice():
     assert parts[0].kind == parts[-1].kind == "law"
     begun = {part.policy for part in parts}
     assert {"no-divert", "hazard-aware", "deferred-decision", "oracle-fuel", "td3"} <= begun
-
-
-@pytest.mark.slow
-def test_a_policy_that_fails_in_a_process_is_named_by_its_flight(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(registry, "REGISTRY", registry.REGISTRY.copy())
-    monkeypatch.setattr("studies.compare.rehearsal.kernel_folder", lambda: tmp_path)
-    monkeypatch.setattr("os.cpu_count", lambda: 2)
-    policy_entry(RAISES)
-    study = Study(PRESETS["paper"], ("no-divert", "raising"), 50, paths=(RAISES,))
-    with pytest.raises(PolicyError, match=r"policy 'raising' failed in episode 0 .* no idea"):
-        rehearse(study, Console(), workers=2)
