@@ -22,6 +22,7 @@ powered descent); Bryson, Denham and Dreyfus, AIAA Journal 1(11), 1963 (limits o
 from __future__ import annotations
 
 import math
+from typing import cast
 
 import numpy as np
 
@@ -46,9 +47,10 @@ LEAST_PULL, MOST_PULL = 1e-6, 0.98
 """Between these lies the square of gravity over full thrust per start mass."""
 ANGLES = 4
 """Of the numbers of a step: two for each primer; three times follow, then those of a touch."""
-FREE, TOUCHING = 7, 9
-"""Equations and unknowns of a flight, and of one that touches the ground."""
-HELD, TOUCHING_HELD = 6, 8
+FREE, TOUCHING = cast("tuple[int, int]", (np.int64(7), np.int64(9)))
+"""Equations and unknowns of a flight, and of one that touches the ground. They are numpy's: numba compiles a
+kernel anew for each number of Python's that another kernel hands to it."""
+HELD, TOUCHING_HELD = cast("tuple[int, int]", (np.int64(6), np.int64(8)))
 """The same where the time of flight is held, and the Hamiltonian need not vanish."""
 _TIME = 6  # place of the time of flight among the unknowns, and of the Hamiltonian among the equations
 
@@ -110,12 +112,15 @@ def _set_frame(x: Extremal, frame: Array) -> None:
         for i in range(1, 3):
             if abs(q[i]) < abs(q[axis]):
                 axis = i
-        first = -q[axis] * q
+        first, tilt = frame[2 * k], -q[axis]
+        for i in range(3):
+            first[i] = tilt * q[i]
         first[axis] += 1.0
-        first /= math.sqrt(dot(first, first))
+        size = math.sqrt(dot(first, first))
+        for i in range(3):
+            first[i] /= size
         for i in range(3):
             j, h = (i + 1) % 3, (i + 2) % 3
-            frame[2 * k, i] = first[i]
             frame[2 * k + 1, i] = q[j] * first[h] - q[h] * first[j]
 
 
@@ -264,9 +269,9 @@ def solve_primer(problem: PrimerProblem, x: Extremal) -> bool:
     if not LEAST_PULL < dot(g, g) < MOST_PULL or not dot(r, g) < 0.0:
         return False
     for attempt in range(2):
-        if guess_suicide_burn(problem, attempt == 0, x) and solve_from(x, problem, 7):
+        if guess_suicide_burn(problem, attempt == 0, x) and solve_from(x, problem, FREE):
             return True
-    return guess_impulses(problem, x) and solve_from(x, problem, 7)
+    return guess_impulses(problem, x) and solve_from(x, problem, FREE)
 
 
 @compile_kernel
