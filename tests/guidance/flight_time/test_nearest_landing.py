@@ -40,6 +40,7 @@ def test_it_lands_within_the_tank_and_the_primer_points_at_the_target():
     assert len(found) > 25
     for problem, nearest in found:
         flight, miss = nearest.flight, nearest.problem.target - problem.target
+        assert flight is not None
         assert flight.broken == KEPT
         assert miss[2] == 0.0
         error = math.hypot(miss[0], miss[1])
