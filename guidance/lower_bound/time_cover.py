@@ -209,11 +209,11 @@ def join_cover(
 def _marks_about(theta: float, times: Array) -> Array:
     """The grid with theta [s], and ever closer to it on both sides: a primer may turn fast at its kink."""
     cell = min(max(int(np.searchsorted(times, theta)), 1), times.size - 1)
-    step, size = times[cell] - times[cell - 1], times.size
+    away, size = times[cell] - times[cell - 1], times.size
     marks = np.empty(size + 2 * _CLOSER + 1)
     marks[:size], marks[size] = times, theta
     for k in range(_CLOSER):
-        away = step * _CLOSER_BY ** (k + 1)
+        away *= _CLOSER_BY
         marks[size + 1 + 2 * k], marks[size + 2 + 2 * k] = theta - away, theta + away
     marks = np.sort(marks)
     kept = 0
@@ -238,7 +238,8 @@ def sweep_cells(primer: Array, times: Array, case: DualCase, lowest: Array) -> N
     for k in range(lowest.size):
         lowest[k] = np.inf
         while part < parts.size and marks[part] < times[k + 1]:
-            lowest[k] = min(lowest[k], parts[part])
+            if not parts[part] >= lowest[k]:  # nan too, which bounds nothing
+                lowest[k] = parts[part] if parts[part] > -np.inf else -np.inf
             part += 1
 
 
