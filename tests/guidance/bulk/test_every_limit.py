@@ -16,7 +16,7 @@ TOUCHING = [
     [-11.3, 0.4, 202.6, 17.4, 25.7, -48.7, 1194.5],
     [9.4, -38.2, 103.7, 8.9, 27.0, -29.2, 1186.2],
 ]
-SIDEWAYS = [-141.9, -143.2, 197.2, 48.7, 26.7, -33.5, 1200.0]  # never coasts
+NEVER_COASTS = [-141.9, -143.2, 197.2, 48.7, 26.7, -33.5, 1200.0]
 
 
 def paper_starts(count, seed):
@@ -27,16 +27,16 @@ def paper_starts(count, seed):
 @pytest.mark.parametrize(
     ("asked", "methods"),
     [
-        ({"limits": Limits(final_thrust_direction=Cone(0.11))}, {"indirect", "convex"}),
-        ({"limits": Limits(line_of_sight=Cone(0.26))}, {"indirect", "convex"}),
-        ({"limits": Limits(glide_slope=0.26, final_thrust_direction=Cone(0.2))}, {"indirect", "convex"}),
+        ({"limits": Limits(final_thrust_direction=Cone(0.2647))}, {"indirect", "convex"}),
+        ({"limits": Limits(line_of_sight=Cone(0.3086))}, {"indirect", "convex"}),
+        ({"limits": Limits(glide_slope=0.3086, final_thrust_direction=Cone(0.28))}, {"indirect", "convex"}),
         ({"limits": Limits(thrust_rate=4000.0)}, {"convex"}),
         ({"target_velocity": (3.0, 0.0, -12.0)}, {"convex"}),
         ({"angular_velocity": (0.0, 1e-3, 0.0)}, {"convex"}),
     ],
 )
 def test_what_is_asked_is_answered_as_in_single_calls(asked, methods):
-    count = 12 if "indirect" in methods else 2
+    count = 4 if "indirect" in methods else 2
     starts = paper_starts(count, 21)
     found = solve_pdg_many(starts, TARGET, nodes=9, **asked)
     assert set(found.method) == methods
@@ -51,7 +51,7 @@ def test_what_is_asked_is_answered_as_in_single_calls(asked, methods):
 
 
 def test_flights_in_bulk_lie_within_the_cones():
-    limits = Limits(final_thrust_direction=Cone(0.11), line_of_sight=Cone(0.26, (0.05, 0.0, 1.0)))
+    limits = Limits(final_thrust_direction=Cone(0.264), line_of_sight=Cone(0.31, (0.02, 0.0, 1.0)))
     found = solve_pdg_many(paper_starts(400, 22), TARGET, limits=limits, nodes=61, fallback=False)
     answered = found.method == "indirect"
     assert 20 < answered.sum() < 380
@@ -59,12 +59,12 @@ def test_flights_in_bulk_lie_within_the_cones():
     assert limits.line_of_sight is not None
     assert limits.line_of_sight.outside(found.nodes.position[answered, :-1] - TARGET).max() < 0.01
     for thrust in found.nodes.thrust[answered, -1]:
-        assert Cone(0.11).excess(thrust) < 1e-9
+        assert Cone(0.264).excess(thrust) < 1e-9
     free = solve_pdg_many(paper_starts(400, 22), TARGET, fallback=False)
     assert np.array_equal(found.propellant[answered], free.propellant[answered])
 
 
-@pytest.mark.parametrize("start", [*TOUCHING, SIDEWAYS])
+@pytest.mark.parametrize("start", [*TOUCHING, NEVER_COASTS])
 def test_touching_flights_and_those_without_a_coast_are_those_of_single_calls(start):
     found = solve_pdg_many([start, start], TARGET, nodes=41)
     flight = find_primer_flight(LandingProblem(State.parse(start), TARGET, PAPER_LANDER, GRAVITY))
@@ -73,8 +73,8 @@ def test_touching_flights_and_those_without_a_coast_are_those_of_single_calls(st
     assert found.method[0] == plan.method == "indirect"
     assert found.propellant[0] == pytest.approx(plan.propellant, rel=1e-9)
     assert found.time_of_flight[1] == pytest.approx(flight.time, rel=1e-9)
-    assert touches(flight.extremal) == (start != SIDEWAYS)
-    if start == SIDEWAYS:
+    assert touches(flight.extremal) == (start != NEVER_COASTS)
+    if start == NEVER_COASTS:
         assert flight.braking - flight.first_burn < 1e-6 * flight.time
     assert found.nodes is not None
     states, thrust = plan.states_at(found.nodes.time[0]), plan.thrust_at(found.nodes.time[0])

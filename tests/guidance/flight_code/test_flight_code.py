@@ -49,8 +49,8 @@ def dispersed_start(rng):
 def check_equal(found, expected) -> float:
     """Assert that answers are equal to 1e-9, directions to 1e-8; returns what is between the bounds.
 
-    That is in propellants; of a bound beside a touch of the ground that lies more than 1 % below the flight it
-    is only said that it is a bound, for how weak it is hangs on rounding.
+    That is in propellants. Of a bound beside a touch of the ground that lies more than 1 % below the flight
+    it is only said that it is a bound, for how weak it is hangs on rounding.
     """
     assert found.status is expected.status
     assert found.propellant == pytest.approx(expected.propellant, rel=1e-9, nan_ok=True)
