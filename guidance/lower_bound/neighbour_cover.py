@@ -125,6 +125,16 @@ def _join_constant(
 
 
 @compile_kernel
+def _join_constants(times: Array, case: DualCase, primers: Array, envelope: Array, owner: Index) -> float:
+    """Begin a cover with its constant primers; [m/s] what the first bounds at all times beyond the grid."""
+    last, change = last_primer(case, times[-1]), along_change(case)
+    primers[0], primers[1] = widen_primer(last), widen_primer(change)
+    _join_constant(last, 0, times, case, envelope, owner)
+    _join_constant(change, 1, times, case, envelope, owner)
+    return linear_part(last, times[-1], case)
+
+
+@compile_kernel
 def _next_time(mark: float, beside: Neighbours, best_time: float, stride: float, farthest: Array) -> float:
     """[s] the time whose primer is taken for a cell at `mark`: further out it may cover the cell and more.
 
@@ -176,10 +186,7 @@ def cover_by_neighbours(
     most = MOST_KINKED if touching else MOST_PRIMERS
     primers, owner = np.empty((most + 1, PRIMER_SIZE)), np.zeros(cells, np.int64)
     envelope = np.full(cells, -np.inf)
-    constant, change = last_primer(case, times[-1]), along_change(case)
-    primers[0], primers[1] = widen_primer(constant), widen_primer(change)
-    _join_constant(constant, 0, times, case, envelope, owner)
-    _join_constant(change, 1, times, case, envelope, owner)
+    beyond = _join_constants(times, case, primers, envelope, owner)
     x, left, right = new_extremal(), best, best
     set_neighbour(best, best_time, x)
     primer, level = _lead(x, case), aim.target - aim.tolerance
@@ -223,7 +230,7 @@ def cover_by_neighbours(
             stride[side] *= 0.5
         else:
             tried = cell if time == mark else -1
-    lowest = min(float(np.min(envelope)), linear_part(constant, times[-1], case))
+    lowest = min(float(np.min(envelope)), beyond)
     return TimeCover(primers[:count].copy(), owner, lowest, best_time, best_value)
 
 
