@@ -170,7 +170,7 @@ def domain_of(problem: PrimerProblem, min_thrust: float) -> int:
 def seek_extremal(
     problem: PrimerProblem, limits: PathLimits, unit: float, log_mass_ratio: float, x: Extremal
 ) -> int:
-    """Find the extremal of the best time, in the order of `find_extremal_flight`; the limit that it breaks.
+    """Find the extremal of the best time: with a coast, without, or touching; the limit that it breaks.
 
     Args:
         problem: in seconds.
@@ -189,7 +189,7 @@ def seek_extremal(
     elif solve_full_burn(problem, other):
         copy_extremal(other, x)
         broken = judge_extremal(x, problem, limits, unit, log_mass_ratio)
-    if broken in (_NOTHING, ALTITUDE) and solve_touching(problem, other):
+    if broken in (_NOTHING, ALTITUDE) and solve_touching(problem, other) and other.touch[1] > 0.0:
         copy_extremal(other, x)
         broken = judge_extremal(x, problem, limits, unit, log_mass_ratio)
     return broken
@@ -222,7 +222,7 @@ def bound_start(
         max(vehicle.limits.least_cosine, -1.0),
         vehicle.sine,
         0.0,
-        0.0,  # no limit on the path but the kink of an extremal that touches the ground
+        0.0,  # no limit on the path: its flight keeps them
     )
     times, cover = bound_by_neighbours(x, problem, case, target, exhaust)
     return Bound(most, times, cover)
