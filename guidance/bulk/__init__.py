@@ -1,7 +1,8 @@
 """Descents in bulk: `solve_pdg_many`, for many starts or many targets at once.
 
-`starts` is what is asked, `certified_flight` the compiled answer to one start, `sampling` a flight on nodes,
-`answers` what comes out, `solve` the entry: all cores, and `solve_pdg` for what the compiled answer leaves.
+`starts` is what is asked, `certified_flight` the compiled answer to one start, `cones` limits that it does
+not know, `sampling` a flight on nodes, `answers` what comes out, `solve` the entry: all cores, and
+`solve_pdg` for what the compiled answer leaves.
 Nothing below imports this wing; other packages do.
 """
 

@@ -82,7 +82,7 @@ class Descents:
         if index in self.certificates or self.method[index] != "indirect":
             return self.certificates.get(index)
         starts = self.starts
-        vehicle = vehicle_of(starts.lander, starts.gravity, starts.glide_slope_limit, starts.speed_limit)
+        vehicle = vehicle_of(starts.lander, starts.gravity, starts.limits)
         start, target = starts.states[index], starts.targets[index]
         answer, bound = answer_start(start, target, vehicle, new_extremal())
         infeasible = answer.finding == Finding.INFEASIBLE

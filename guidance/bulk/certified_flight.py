@@ -9,11 +9,22 @@ from typing import NamedTuple
 import numpy as np
 
 from guidance.arrays import Array
+from guidance.descent.limits import NO_LIMITS, Limits
 from guidance.descent.problem import ROUNDING
-from guidance.flight_time.extremal import Extremal, PrimerProblem, fly_extremal
+from guidance.flight_time.extremal import Extremal, PrimerProblem, copy_extremal, new_extremal, no_touch
+from guidance.flight_time.full_burn import solve_full_burn
 from guidance.flight_time.linear_system import dot
-from guidance.flight_time.path_limits import KEPT, POINTING, PathLimits, broken_limit, path_limits
-from guidance.flight_time.primer_equations import LEAST_PULL, MOST_PULL, solve_primer
+from guidance.flight_time.path_limits import (
+    ALTITUDE,
+    KEPT,
+    POINTING,
+    PROPELLANT,
+    PathLimits,
+    burnt_share,
+    judge_extremal,
+    path_limits,
+)
+from guidance.flight_time.primer_equations import LEAST_PULL, MOST_PULL, solve_primer, solve_touching
 from guidance.kernel import compile_kernel
 from guidance.lander import Lander
 from guidance.lower_bound.dual_case import DualCase, chord_growth
@@ -52,6 +63,7 @@ class Finding(IntEnum):
 
 _OPTIMAL, _INFEASIBLE, _NO_FLIGHT, _TANK_TOO_SMALL = (int(finding) for finding in tuple(Finding)[:4])
 _LEAST_THRUST, _NO_GRAVITY, _WEAK_ENGINE, _NOT_ABOVE = (int(finding) for finding in tuple(Finding)[4:8])
+_NOTHING = -1  # found
 _LEANS = int(Finding.LEANS)  # the other limits follow in the order of `path_limits`
 
 
@@ -105,12 +117,10 @@ class Bound(NamedTuple):
     cover: TimeCover
 
 
-def vehicle_of(
-    lander: Lander, gravity: Array, glide_slope_limit: float | None, speed_limit: float | None
-) -> Vehicle:
-    """The numbers of a lander and its limits."""
+def vehicle_of(lander: Lander, gravity: Array, asked: Limits = NO_LIMITS) -> Vehicle:
+    """The numbers of a lander and of the limits that they are: glide slope, speed and pointing."""
     angle = math.pi if lander.pointing_limit is None else lander.pointing_limit
-    limits = path_limits(lander.pointing_limit, speed_limit, glide_slope_limit)
+    limits = path_limits(lander.pointing_limit, asked.speed, asked.glide_slope)
     sine = math.sin(angle) if angle < math.pi else 0.0
     engine = lander.max_thrust, lander.min_thrust, lander.dry_mass, lander.exhaust_velocity
     return Vehicle(*engine, sine, limits, gravity.copy())
@@ -154,6 +164,35 @@ def domain_of(problem: PrimerProblem, min_thrust: float) -> int:
     if not pull < MOST_PULL:
         return _WEAK_ENGINE
     return _OPTIMAL if dot(problem.position, problem.gravity) < 0.0 else _NOT_ABOVE
+
+
+@compile_kernel
+def seek_extremal(
+    problem: PrimerProblem, limits: PathLimits, unit: float, log_mass_ratio: float, x: Extremal
+) -> int:
+    """Find the extremal of the best time: with a coast, without, or touching; the limit that it breaks.
+
+    Args:
+        problem: in seconds.
+        limits: in SI.
+        unit: [m/s^2] full thrust over start mass.
+        log_mass_ratio: ln(start mass / dry mass).
+        x: the answer, in seconds.
+
+    Returns:
+        As `judge_extremal`; _NOTHING where none was found.
+    """
+    broken, other = _NOTHING, new_extremal()
+    x.touch[:] = no_touch()
+    if solve_primer(problem, x):
+        broken = judge_extremal(x, problem, limits, unit, log_mass_ratio)
+    elif solve_full_burn(problem, other):
+        copy_extremal(other, x)
+        broken = judge_extremal(x, problem, limits, unit, log_mass_ratio)
+    if broken in (_NOTHING, ALTITUDE) and solve_touching(problem, other) and other.touch[1] > 0.0:
+        copy_extremal(other, x)
+        broken = judge_extremal(x, problem, limits, unit, log_mass_ratio)
+    return broken
 
 
 @compile_kernel
@@ -209,20 +248,20 @@ def answer_start(state: Array, target: Array, vehicle: Vehicle, x: Extremal) -> 
     outside = domain_of(problem, vehicle.min_thrust)
     if outside != _OPTIMAL:
         return Answer(outside, math.nan, math.nan), nothing
-    found = solve_primer(problem, x)
-    share = problem.mass_flow * (max(x.times[0], 0.0) + x.times[2] - x.times[1]) if found else 1.0
-    if not share < 1.0:
+    tank = exhaust * math.log(mass / vehicle.dry_mass)
+    broken = seek_extremal(problem, vehicle.limits, unit, tank / exhaust, x)
+    if broken == _NOTHING:
         return Answer(_NO_FLIGHT, math.nan, math.nan), nothing
-    spent, tank = -exhaust * math.log1p(-share), exhaust * math.log(mass / vehicle.dry_mass)
-    if spent > tank:
+    if broken == PROPELLANT:
         enough = tank + 2.0 * GRANTED * exhaust
         bound = bound_start(problem, vehicle, x, unit, tank, enough)
         if bound.cover.level >= enough:
             return Answer(_INFEASIBLE, math.nan, math.inf), bound
         return Answer(_TANK_TOO_SMALL, math.nan, math.nan), nothing
-    broken = broken_limit(fly_extremal(x, problem), vehicle.limits, unit)
     if broken != KEPT:
         return Answer(_LEANS + broken - POINTING, math.nan, math.nan), nothing
+    share = burnt_share(x, problem.mass_flow)
+    spent = -exhaust * math.log1p(-share)
     bound = bound_start(problem, vehicle, x, unit, spent, spent)
     least = claimed_bound(bound.cover.level, spent, exhaust)
     return Answer(_OPTIMAL, mass * share, mass * -math.expm1(-least / exhaust)), bound

@@ -13,17 +13,19 @@ from numpy.typing import ArrayLike
 from guidance.arrays import Array
 from guidance.bulk.answers import INFEASIBLE, OPTIMAL, STATUSES, UNDECIDED, Descents
 from guidance.bulk.certified_flight import Finding, Vehicle, answer_start, scale_start, vehicle_of
+from guidance.bulk.cones import Cones, cones_of, keeps_cones
 from guidance.bulk.sampling import Nodes, no_nodes, sample_extremal, sample_plan, set_thrust
 from guidance.bulk.starts import Starts
 from guidance.constants import MOON_GRAVITY
 from guidance.descent.certificate import Certificate
+from guidance.descent.limits import NO_LIMITS, Limits
 from guidance.descent.plan import Plan
 from guidance.flight_time.extremal import new_extremal
 from guidance.flight_time.primer_vector import find_primer_flight
 from guidance.kernel import compile_kernel
 from guidance.lander import PAPER_LANDER, Lander
 from guidance.lower_bound.proof import prove_least_propellant
-from guidance.pdg.solve import solve_pdg
+from guidance.pdg.solve import solve_pdg, with_shorthands
 from guidance.state import State
 from guidance.validation import finite_number
 
@@ -46,11 +48,16 @@ class _Rows(NamedTuple):
 
 
 @compile_kernel
-def _answer_rows(begin: int, end: int, states: Array, targets: Array, vehicle: Vehicle, rows: _Rows) -> None:
-    """Answer the starts of some rows."""
+def _answer_rows(
+    span: tuple[int, int], states: Array, targets: Array, vehicle: Vehicle, cones: Cones, rows: _Rows
+) -> None:
+    """Answer the starts of some rows, from the first of a span to before the last."""
     x = new_extremal()
-    for k in range(begin, end):
+    for k in range(span[0], span[1]):
         answer, _ = answer_start(states[k], targets[k], vehicle, x)
+        problem = scale_start(states[k], targets[k], vehicle)
+        if answer.finding == _OPTIMAL_FOUND and not keeps_cones(x, problem, cones):
+            continue
         rows.lower_bound[k] = answer.lower_bound
         if answer.finding == _INFEASIBLE_FOUND:
             rows.status[k] = INFEASIBLE
@@ -61,7 +68,6 @@ def _answer_rows(begin: int, end: int, states: Array, targets: Array, vehicle: V
         set_thrust(x, 0.0, vehicle.max_thrust, rows.first_thrust[k])
         if rows.nodes.time.shape[1] > 0:
             engine = vehicle.max_thrust, states[k, 6]
-            problem = scale_start(states[k], targets[k], vehicle)
             sample_extremal(x, problem, engine, targets[k], k, rows.nodes)
 
 
@@ -71,6 +77,9 @@ def solve_pdg_many(
     *,
     lander: Lander = PAPER_LANDER,
     gravity: ArrayLike = MOON_GRAVITY,
+    angular_velocity: ArrayLike = (0.0, 0.0, 0.0),
+    target_velocity: ArrayLike = (0.0, 0.0, 0.0),
+    limits: Limits = NO_LIMITS,
     glide_slope_limit: float | None = None,
     speed_limit: float | None = None,
     nodes: int | None = None,
@@ -80,30 +89,37 @@ def solve_pdg_many(
     """Plan the descents of least propellant from N states to one target, from one to N, or from N to N.
 
     Compiled code answers the starts whose flight the indirect method finds, within every limit, and proves
-    what no flight undercuts; `solve_pdg` answers the rest, one after another.
+    what no flight undercuts; `solve_pdg` answers the rest, one after another on one core, each in a
+    millisecond to a few hundred. That is every start with a target velocity, a turning site, a least thrust
+    or a limited thrust rate; of other starts, those whose flight breaks a limit.
 
     Args:
         states: State or (x, y, z, vx, vy, vz, mass), shape (7,) or (N, 7).
         targets: [m] shape (3,) or (N, 3), site frame; no flight goes below its target's altitude.
         lander: the vehicle. Its pointing limit is measured from the z axis.
         gravity: [m/s^2] shape (3,).
-        glide_slope_limit: [rad] greatest angle from the z axis, seen from the target, in (0, pi/2].
-        speed_limit: [m/s] greatest speed.
+        angular_velocity: [rad/s] shape (3,), of the site frame about an axis through its origin.
+        target_velocity: [m/s] shape (3,), at the targets.
+        limits: what the paths have to keep.
+        glide_slope_limit: [rad] shorthand for `limits.glide_slope`.
+        speed_limit: [m/s] shorthand for `limits.speed`.
         nodes: n at least 2, for each flight at n equal steps of its time; None for none.
         fallback: whether `solve_pdg` is asked where the compiled code has no answer; those starts are else
             'limit reached': nothing is known of them.
         threads: that share the work; None for one a core. The answers do not depend on it.
 
     Returns:
-        A row for each start, in order.
+        A row for each start, in order; its `method` says who answered.
 
     Raises:
         ValueError: an argument is out of range, not finite or of the wrong shape, or a start lies below its
             target's altitude or has no propellant; the first such row is named.
     """
-    starts = Starts.parse(states, targets, lander, gravity, (glide_slope_limit, speed_limit))
-    rows = _no_rows(len(starts), _node_count(nodes))
-    certificates = _answer_all(starts, rows, _thread_count(threads))
+    limits = with_shorthands(limits, glide_slope=glide_slope_limit, speed=speed_limit)
+    vectors = {"gravity": gravity, "target_velocity": target_velocity, "angular_velocity": angular_velocity}
+    starts = Starts.parse(states, targets, lander, limits, **vectors)
+    rows, threads = _no_rows(len(starts), _node_count(nodes)), _thread_count(threads)
+    certificates = _answer_all(starts, rows, threads) if starts.in_bulk else {}
     method = np.full(len(starts), "", "<U8")
     method[rows.status != UNDECIDED] = _INDIRECT
     if fallback:
@@ -149,15 +165,16 @@ def _answer_all(starts: Starts, rows: _Rows, threads: int) -> dict[int, Certific
     Returns:
         Certificates of the bounds that had to be searched for, by row.
     """
-    vehicle = vehicle_of(starts.lander, starts.gravity, starts.glide_slope_limit, starts.speed_limit)
+    vehicle, cones = vehicle_of(starts.lander, starts.gravity, starts.limits), cones_of(starts.limits)
     spans = [(k, min(k + _CHUNK, len(starts))) for k in range(0, len(starts), _CHUNK)]
 
     def answer(span: tuple[int, int]) -> dict[int, Certificate | None]:
         begin, end = span
-        _answer_rows(begin, end, starts.states, starts.targets, vehicle, rows)
+        _answer_rows(span, starts.states, starts.targets, vehicle, cones, rows)
         gap = rows.propellant[begin:end] - rows.lower_bound[begin:end]
         weak = begin + np.flatnonzero(gap > _WEAK * starts.states[begin:end, 6])
-        return {k: _tighten(starts, k, rows) for k in weak.tolist()}
+        better = {k: _tighten(starts, k, rows) for k in weak.tolist()}
+        return {k: certificate for k, certificate in better.items() if certificate is not None}
 
     found = [answer(span) for span in spans[:1]]  # compiles
     if min(threads, len(spans)) <= 1:
@@ -168,11 +185,13 @@ def _answer_all(starts: Starts, rows: _Rows, threads: int) -> dict[int, Certific
     return {k: certificate for part in found for k, certificate in part.items()}
 
 
-def _tighten(starts: Starts, row: int, rows: _Rows) -> Certificate:
-    """Search for a better bound of a flight that was found, and write it."""
+def _tighten(starts: Starts, row: int, rows: _Rows) -> Certificate | None:
+    """Search for a better bound of a flight that was found, and write it; None where it is none."""
     problem = starts.problem(row)
     known = float(rows.propellant[row]), float(rows.time_of_flight[row])
     certificate = prove_least_propellant(problem, *known, find_primer_flight(problem))
+    if not certificate.lower_bound > rows.lower_bound[row]:
+        return None
     rows.lower_bound[row] = certificate.lower_bound
     return certificate
 
@@ -183,8 +202,9 @@ def _ask(starts: Starts, index: int) -> Plan:
         starts.targets[index],
         lander=starts.lander,
         gravity=starts.gravity,
-        glide_slope_limit=starts.glide_slope_limit,
-        speed_limit=starts.speed_limit,
+        angular_velocity=starts.angular_velocity,
+        target_velocity=starts.target_velocity,
+        limits=starts.limits,
         throw=False,
     )
 

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from guidance.arrays import Array
-from guidance.descent.limits import Limits
+from guidance.descent.limits import NO_LIMITS, Limits
 from guidance.descent.problem import LARGEST_NUMBER, ROUNDING, LandingProblem
 from guidance.lander import Lander
 from guidance.state import State
-from guidance.validation import finite_number, finite_vector
+from guidance.validation import finite_vector
+
+_VECTORS = ("gravity", "target_velocity", "angular_velocity")
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,8 +26,9 @@ class Starts:
         targets: [m] shape (N, 3), site frame.
         lander: the vehicle.
         gravity: [m/s^2] shape (3,).
-        glide_slope_limit: [rad] as in `LandingProblem`, or None.
-        speed_limit: [m/s] or None.
+        limits: what the paths have to keep.
+        target_velocity: [m/s] shape (3,), at the targets.
+        angular_velocity: [rad/s] shape (3,), of the site frame.
 
     Raises:
         ValueError: an argument is out of range, not finite or of the wrong shape; the first row that is so
@@ -37,8 +39,9 @@ class Starts:
     targets: Array
     lander: Lander
     gravity: Array
-    glide_slope_limit: float | None = None
-    speed_limit: float | None = None
+    limits: Limits = NO_LIMITS
+    target_velocity: Array = field(default_factory=lambda: np.zeros(3))
+    angular_velocity: Array = field(default_factory=lambda: np.zeros(3))
 
     @classmethod
     def parse(
@@ -46,10 +49,10 @@ class Starts:
         states: State | ArrayLike,
         targets: ArrayLike,
         lander: Lander,
-        gravity: ArrayLike,
-        limits: tuple[float | None, float | None],
+        limits: Limits = NO_LIMITS,
+        **vectors: ArrayLike,
     ) -> Starts:
-        """Accept one state or N, and one target or N; `limits` are the glide slope's and the speed's."""
+        """Accept one state or N, and one target or N; `vectors` by their names, gravity at least."""
         if isinstance(states, State):
             states = states.as_array()
         rows, sites = _finite_rows("states", states, 7), _finite_rows("targets", targets, 3)
@@ -62,16 +65,18 @@ class Starts:
             np.broadcast_to(rows, (count, 7)).copy(),
             np.broadcast_to(sites, (count, 3)).copy(),
             lander,
-            finite_vector("gravity", gravity, 3),
-            *limits,
+            limits=limits,
+            **{name: finite_vector(name, vector, 3) for name, vector in vectors.items()},
         )
 
     def __post_init__(self) -> None:
         """Refuse what no solver should see."""
         if not isinstance(self.lander, Lander):
             raise ValueError(f"lander must be a Lander, got {self.lander!r}")
-        if np.abs(self.gravity).max() > LARGEST_NUMBER:
-            raise ValueError(f"gravity: no number may exceed {LARGEST_NUMBER:g}, got {self.gravity.tolist()}")
+        for name in _VECTORS:
+            numbers = getattr(self, name)
+            if np.abs(numbers).max() > LARGEST_NUMBER:
+                raise ValueError(f"{name}: no number may exceed {LARGEST_NUMBER:g}, got {numbers.tolist()}")
         for name, rows in (("states", self.states), ("targets", self.targets)):
             _refuse(
                 name,
@@ -84,16 +89,21 @@ class Starts:
         depth = -offset[:, 2]
         below = (depth > 0.0) & (depth > ROUNDING * np.maximum(1.0, np.linalg.norm(offset, axis=1)))
         _refuse("states", below, "the start lies below the target's altitude")
-        if self.glide_slope_limit is not None:
-            finite_number("glide_slope_limit", self.glide_slope_limit, above=0.0, at_most=math.pi / 2)
-        if self.speed_limit is not None:
-            finite_number("speed_limit", self.speed_limit, above=0.0)
-        for array in (self.states, self.targets, self.gravity):
+        for array in (self.states, self.targets, *(getattr(self, name) for name in _VECTORS)):
             array.flags.writeable = False
 
     def __len__(self) -> int:
         """N."""
         return len(self.states)
+
+    @property
+    def in_bulk(self) -> bool:
+        """Whether the indirect method knows such problems: an end at rest, in a frame that does not turn.
+
+        Nor does it know a limited rate of the thrust.
+        """
+        still = not (self.target_velocity.any() or self.angular_velocity.any())
+        return still and self.limits.thrust_rate is None
 
     def problem(self, index: int) -> LandingProblem:
         """One of the landing problems."""
@@ -102,7 +112,9 @@ class Starts:
             self.targets[index],
             self.lander,
             self.gravity,
-            Limits(glide_slope=self.glide_slope_limit, speed=self.speed_limit),
+            self.limits,
+            self.target_velocity,
+            self.angular_velocity,
         )
 
 

@@ -28,6 +28,7 @@ from guidance.arrays import Array
 from guidance.descent.problem import LandingProblem
 
 _EVEN, _RISING, _INSIDE = 600, 300, 200  # marks of a piece: even from 0 on, ever wider, and within its span
+_ABOUT = 60  # on each side of its kink
 _ROUNDING = 1e-9  # of the exhaust velocity
 _MOST_RATIO = 50.0  # of velocity change over exhaust velocity: no vehicle spends more
 
@@ -151,7 +152,7 @@ class DualBound:
                     np.linspace(0.0, end, _EVEN),
                     end * np.geomspace(1e-5, 1.0, _RISING),
                     np.linspace(piece.begin, end, _INSIDE),
-                    [min(piece.path_time, end)],
+                    _marks_about(piece, end),
                 ]
             )
         )
@@ -263,6 +264,15 @@ class _ThrustBounds:
             spent += weight * area
             s, remaining = end, remaining - duration if crosses else 0.0
         return s, spent
+
+
+def _marks_about(piece: DualPiece, end: float) -> Array:
+    """[s] theta, and ever closer to it on both sides, within the times of a piece: it may turn fast there."""
+    if not piece.path_multiplier.any():
+        return np.array([end])
+    away = end * np.geomspace(1e-7, 0.05, _ABOUT)
+    marks = np.concatenate([piece.path_time - away, [piece.path_time], piece.path_time + away])
+    return np.clip(marks, 0.0, end)
 
 
 def _growth(rate: float, time: float) -> float:

@@ -1,11 +1,11 @@
 /*
  * Least-propellant powered descent: the flight of the indirect method, and a proved lower bound on the
  * propellant of every flight. C99, <math.h> alone; doubles; no heap, no globals that change, every loop
- * bounded; less than 20 kB of stack. SI units; frame: x east, y north, z up.
+ * bounded; less than 24 kB of stack. SI units; frame: x east, y north, z up.
  *
- * The flight burns at full thrust, coasts, and burns at full thrust. It is the best one under constant gravity
- * where the engine can stop and no limit on the path binds; a flight that breaks a limit is refused, and its
- * status says which. This is reference code for study and test, not certified flight software.
+ * The flight burns at full thrust, coasts, and burns at full thrust; it may touch the target's altitude once in
+ * its first burn, and it may lack the coast. It is the best one under constant gravity where the engine can stop
+ * and no other limit on the path binds; a flight that breaks one is refused, and its status says which. This is reference code for study and test, not certified flight software.
  */
 #ifndef POWERED_DESCENT_H
 #define POWERED_DESCENT_H
@@ -62,6 +62,7 @@ typedef struct {
     double max_thrust;     /* [N] of its burns */
     double primer[2][3];   /* unit vectors along the thrust at two times; in between and beyond it is affine */
     double primer_times[2]; /* [s] these times; the first may lie before the start */
+    double touch[2]; /* [s] time of a touch of the ground, -INFINITY for none; [1/s] slope of its upward part before */
 } descent_flight;
 
 /* Plan a descent; returns flight->status. */

@@ -74,6 +74,7 @@ class CodeAnswer(NamedTuple):
         time_of_flight: [s].
         lower_bound: [kg]; inf where there is no flight.
         first_thrust: [N] shape (3,).
+        touch_time: [s] of a touch of the ground; -inf for none.
     """
 
     status: CodeStatus
@@ -81,6 +82,7 @@ class CodeAnswer(NamedTuple):
     time_of_flight: float
     lower_bound: float
     first_thrust: Array
+    touch_time: float = math.nan
 
 
 def answer_question(question: Question) -> CodeAnswer:
@@ -95,7 +97,8 @@ def answer_question(question: Question) -> CodeAnswer:
     if answer.finding != Finding.OPTIMAL:
         return CodeAnswer(Finding(answer.finding), math.nan, math.nan, answer.lower_bound, nothing)
     set_thrust(x, 0.0, question.max_thrust, thrust)
-    return CodeAnswer(Finding.OPTIMAL, answer.propellant, float(x.times[2]), answer.lower_bound, thrust)
+    told = answer.propellant, float(x.times[2]), answer.lower_bound, thrust, float(x.touch[0])
+    return CodeAnswer(Finding.OPTIMAL, *told)
 
 
 def _vehicle(question: Question) -> Vehicle:

@@ -22,6 +22,16 @@ _GOOD = Question(
     (200.0, 100.0, 950.0, -8.0, -4.0, -30.0, 1200.0),
     (0.0, 0.0, 50.0),
 )
+_TOUCHING = (
+    (-164.2, -138.1, 179.3, -2.2, -29.1, -46.7, 1199.0),
+    (-11.3, 0.4, 202.6, 17.4, 25.7, -48.7, 1194.5),
+    (9.4, -38.2, 103.7, 8.9, 27.0, -29.2, 1186.2),
+)
+_WITHOUT_COAST = (
+    (-3.3, 47.1, 151.9, -3.8, -23.6, -35.9, 1200.0),
+    (-141.9, -143.2, 197.2, 48.7, 26.7, -33.5, 1200.0),
+    (41.5, -113.1, 92.5, -9.4, 44.8, -15.3, 1200.0),
+)
 _WRONG = (math.nan, math.inf, -math.inf, 1e12, -1e12, 0.0, -1.0)
 _COLUMNS = (
     "max_thrust,min_thrust,dry_mass,exhaust_velocity,gravity_x,gravity_y,gravity_z,"
@@ -50,7 +60,10 @@ def wrong_questions() -> list[Question]:
 
 
 def edge_questions() -> list[Question]:
-    """Questions outside the method's domain, and flights that break a limit by a little, or by nothing."""
+    """Questions outside the method's domain, and flights that break a limit by a little, or by nothing.
+
+    Flights that touch the ground and flights without a coast, too.
+    """
     low, level = (200.0, 100.0, 50.0, 0.0, 0.0, 0.0, 1200.0), (120.0, 0.0, 50.0, 0.0, 0.0, 30.0, 1200.0)
     return [
         _GOOD._replace(min_thrust=500.0),
@@ -63,6 +76,8 @@ def edge_questions() -> list[Question]:
         _GOOD._replace(state=(*_GOOD.state[:6], 1170.0)),
         _GOOD._replace(dry_mass=1176.0),
         _GOOD._replace(dry_mass=1174.9),
+        *(_GOOD._replace(state=state) for state in (*_TOUCHING, *_WITHOUT_COAST)),
+        *(_GOOD._replace(state=state, speed_limit=50.0) for state in _TOUCHING),
         *(_GOOD._replace(pointing_limit=angle) for angle in (0.2, 0.9, 1.5, math.pi)),
         *(_GOOD._replace(speed_limit=speed) for speed in (40.0, 60.0, 80.0)),
         *(_GOOD._replace(glide_slope_limit=angle) for angle in (0.1, 0.24, 0.4, math.pi / 2)),

@@ -6,7 +6,8 @@ the unknowns y = (q1, q2, t1, t2), have a root for each T near the best one. Alo
     dF/dy y' + dF/dT = 0,    and next to them    dF/dy (y - y0) = -F(y0, T),
 
 whose matrices are columns of the Jacobian that Newton's method takes: one Jacobian corrects an extremal that
-was carried over from another time, and carries it on.
+was carried over from another time, and carries it on. A touch of the ground adds its two equations to F and
+its two unknowns to y.
 
 Where a flight starts with a coast, another T needs a first burn: against q2 to land earlier, along q2 to land
 later. While it is short the last burn hardly changes, and with it q2 and what of the primer's slope is normal
@@ -30,12 +31,20 @@ from guidance.flight_time.extremal import (
     in_unit,
     new_extremal,
     no_touch,
+    touches,
 )
 from guidance.flight_time.linear_system import solve_linear
-from guidance.flight_time.primer_equations import ANGLES, move_extremal, residuals, set_jacobian
+from guidance.flight_time.primer_equations import (
+    ANGLES,
+    FREE,
+    TOUCHING,
+    move_extremal,
+    residuals,
+    set_jacobian,
+)
 from guidance.kernel import compile_kernel
 
-_FIXED = 6  # equations, and unknowns, of a given time of flight
+_FIXED = 6  # equations, and unknowns, of a given time of flight; the place of the Hamiltonian, and of T
 _MOST_TURN = 0.5  # [rad], and of the time of flight: a longer correction leads nowhere
 
 
@@ -45,8 +54,9 @@ class Neighbours(NamedTuple):
     Attributes:
         extremal: nearly one, of its time of flight.
         frame: tangent frames of q1 and q2, shape (4, 3).
-        correction: step to the extremal of that time, shape (7,): four angles [rad], t1, t2 and T [s].
-        rate: change of the step per second of flight, shape (7,): [rad/s] and [s/s].
+        correction: step to the extremal of that time, shape (7,): four angles [rad], t1, t2 and T [s]; shape
+            (9,) with a touch of the ground: s [s] and c [1/s] as well.
+        rate: change of the step per second of flight, of the same shape.
     """
 
     extremal: Extremal
@@ -57,39 +67,59 @@ class Neighbours(NamedTuple):
 
 @compile_kernel
 def _solve_fixed(jacobian: Array, right: Array, unit: float, step: Array) -> None:
-    """Write the step, in seconds, that takes the six equations to -right; none where they are singular."""
-    matrix, vector = np.empty((_FIXED, _FIXED)), np.empty(_FIXED)
-    for i in range(_FIXED):
-        vector[i] = -right[i]
-        for k in range(_FIXED):
-            matrix[i, k] = jacobian[i, k]
+    """Write the step, in seconds, that takes all equations but the Hamiltonian's to -right, T held.
+
+    It is zero where they are singular.
+    """
+    size = step.size - 1
+    matrix, vector = np.empty((size, size)), np.empty(size)
+    for i in range(size):
+        row = i if i < _FIXED else i + 1
+        vector[i] = -right[row]
+        for k in range(size):
+            matrix[i, k] = jacobian[row, k if k < _FIXED else k + 1]
     step[:] = 0.0
     if solve_linear(matrix, vector) and bool(np.isfinite(vector).all()):
         for k in range(_FIXED):
             step[k] = vector[k] if k < ANGLES else vector[k] * unit
+        if step.size == TOUCHING:
+            step[FREE], step[FREE + 1] = vector[_FIXED] * unit, vector[_FIXED + 1] / unit
+
+
+@compile_kernel
+def _is_near(step: Array, unit: float) -> bool:
+    """Whether a step [rad, s] is short enough to lead anywhere, beside a time of flight [s]."""
+    for k in range(step.size if step.size == FREE else FREE + 1):
+        if not abs(step[k]) < (_MOST_TURN if k < ANGLES else _MOST_TURN * unit):
+            return False
+    return True
 
 
 @compile_kernel
 def find_neighbours(extremal: Extremal, problem: PrimerProblem) -> Neighbours:
     """Neighbours of an extremal, or of nearly one, of a problem; both in seconds as in `solve_primer`.
 
-    It does not touch the ground.
+    Those of a flight that touches the ground touch it too.
     """
-    unit = extremal.times[2]
+    unit, size = extremal.times[2], TOUCHING if touches(extremal) else FREE
     scaled = in_unit(problem, unit)
-    x = Extremal(extremal.primer, extremal.times / unit, no_touch())
-    here, frame, jacobian = np.empty(7), np.empty((4, 3)), np.empty((7, 7))
+    touch = no_touch()
+    if size == TOUCHING:
+        touch[0], touch[1] = extremal.touch[0] / unit, extremal.touch[1] * unit
+        touch[2] = extremal.touch[2] / (unit * unit)
+    x = Extremal(extremal.primer, extremal.times / unit, touch)
+    here, frame, jacobian = np.empty(size), np.empty((4, 3)), np.empty((size, size))
     residuals(x, scaled, here)
     set_jacobian(x, scaled, here, frame, new_extremal(), jacobian)
-    correction, rate = np.empty(7), np.empty(7)
+    correction, rate = np.empty(size), np.empty(size)
     _solve_fixed(jacobian, here, unit, correction)
-    for k in range(_FIXED):
-        if not abs(correction[k]) < (_MOST_TURN if k < ANGLES else _MOST_TURN * unit):
-            correction[:] = 0.0
-            break
+    if not _is_near(correction, unit):
+        correction[:] = 0.0
     _solve_fixed(jacobian, jacobian[:, _FIXED], 1.0, rate)
     for k in range(ANGLES):
         rate[k] /= unit
+    if size == TOUCHING:
+        rate[FREE + 1] /= unit * unit
     rate[_FIXED] = 1.0
     kept = new_extremal()
     copy_extremal(extremal, kept)
@@ -99,8 +129,8 @@ def find_neighbours(extremal: Extremal, problem: PrimerProblem) -> Neighbours:
 @compile_kernel
 def set_neighbour(known: Neighbours, time: float, out: Extremal) -> None:
     """Write the extremal of a time of flight [s]."""
-    step, delay = np.empty(7), time - known.extremal.times[2]
-    for k in range(7):
+    step, delay = np.empty(known.rate.size), time - known.extremal.times[2]
+    for k in range(step.size):
         step[k] = known.correction[k] + known.rate[k] * delay
     move_extremal(known.extremal, known.frame, step, out)
 
@@ -129,7 +159,8 @@ def neighbours_at(known: Neighbours, problem: PrimerProblem, time: float) -> Nei
     """Neighbours of the extremal of another time of flight [s], from known ones."""
     near, there = known.extremal.times[2], new_extremal()
     set_neighbour(known, time, there)
-    if time != near and (known.extremal.times[0] < 0.0 or there.times[0] < 0.0):
+    coasts = known.extremal.times[0] < 0.0 or there.times[0] < 0.0
+    if time != near and coasts and not touches(there):
         first = new_extremal()
         set_neighbour(known, near, first)
         _begin_first_burn(first, time - near)

@@ -3,6 +3,7 @@
 Any affine primer bounds the velocity change of every time of flight; that of the extremal of a time does so
 tightly near it. The best extremal's primer bounds the best time, those of its neighbours (to first order:
 their errors cost tightness, never truth) the times beside it; far out two impulses do, and constant primers.
+Where the best flight touches the ground its neighbours do, and their primers have its kink.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from guidance.kernel import compile_kernel
 from guidance.lower_bound.dual_ascent import two_impulse_primer
 from guidance.lower_bound.dual_case import DualCase
 from guidance.lower_bound.dual_function import THETA, linear_part
-from guidance.lower_bound.path_limit import widen_primer
+from guidance.lower_bound.path_limit import PRIMER_SIZE, shift_kink, widen_primer
 from guidance.lower_bound.time_cover import (
     CoverAim,
     TimeCover,
@@ -41,12 +42,18 @@ _GROWTH = 4.0  # of that distance from one primer to the next, at most
 _TRIES = 2  # at a cell's own time, each from the neighbours of the one before
 _BEFORE = 1.0 - 1e-9  # of the best time: a node of the grid lies at it, up to rounding
 _EARLIEST = 0.1  # of the best time
+_STRIDE = 0.06  # of the best time, from one primer with a kink to the next: the touch moves fast
+_LONGER = 2.0  # primers where no flight is so short: there the bound has no maximum
+_FAILURES = 2  # of a stride, beside the tries: it is halved each time
+_LOOSER = 5.0  # tolerance beside a touch, where each primer is good for a short span of times
 _IMPULSES = 1.02  # times the level: where two impulses spend so much, their primer is enough
 _CELLS = 70  # of the grid of times, up to the best time
 NEIGHBOUR_TOLERANCE = 2e-6
 """Of the exhaust velocity, 2.4 g of 1200 kg: how far below what is aimed at a cover may lie."""
 MOST_PRIMERS = 24
 """Of a cover by neighbours, the constant ones included."""
+MOST_KINKED = 200
+"""The same beside a flight that touches the ground."""
 
 
 @compile_kernel
@@ -84,8 +91,20 @@ def kinked_primer_of(x: Extremal, case: DualCase) -> Array:
     if touches(x):
         slope = (x.primer[0] - x.primer[1]) / (x.times[1] - x.times[0])
         scale = math.sqrt(dot(primer[3:], primer[3:]) / dot(slope, slope))
-        out[THETA - 1], out[THETA] = scale * x.touch[1], x.times[2] - x.touch[0]
+        out[THETA - 1], out[THETA] = scale * max(x.touch[1], 0.0), x.times[2] - x.touch[0]
     return out
+
+
+@compile_kernel
+def _lead(x: Extremal, case: DualCase) -> Array:
+    """The primer of an extremal: of ten numbers where it touches the ground, else (a, b)."""
+    return kinked_primer_of(x, case) if touches(x) else primer_of(x, case)
+
+
+@compile_kernel
+def _in_order(x: Extremal) -> bool:
+    """Whether an extremal's times are, with that of a touch."""
+    return x.times[0] < x.times[1] < x.times[2] and x.touch[0] < x.times[0]
 
 
 @compile_kernel
@@ -106,6 +125,47 @@ def _join_constant(
 
 
 @compile_kernel
+def _join_constants(times: Array, case: DualCase, primers: Array, envelope: Array, owner: Index) -> float:
+    """Begin a cover with its constant primers; [m/s] what the first bounds at all times beyond the grid."""
+    last, change = last_primer(case, times[-1]), along_change(case)
+    primers[0], primers[1] = widen_primer(last), widen_primer(change)
+    _join_constant(last, 0, times, case, envelope, owner)
+    _join_constant(change, 1, times, case, envelope, owner)
+    return linear_part(last, times[-1], case)
+
+
+@compile_kernel
+def _next_time(mark: float, beside: Neighbours, best_time: float, stride: float, farthest: Array) -> float:
+    """[s] the time whose primer is taken for a cell at `mark`: further out it may cover the cell and more.
+
+    Args:
+        mark: [s].
+        beside: the last one on this side of the best time.
+        best_time: [s].
+        stride: [s] from that one, at most.
+        farthest: [s] of all on this side, from the best time, shape (1,); changed in place.
+    """
+    time, away, known = mark, mark - best_time, beside.extremal.times[2]
+    if farthest[0] == np.inf or farthest[0] < _BEYOND * abs(away):
+        farthest[0] = min(_BEYOND * abs(away), _GROWTH * farthest[0])
+        time = max(best_time + math.copysign(farthest[0], away), _EARLIEST * best_time)
+    return known + math.copysign(stride, time - known) if abs(time - known) > stride else time
+
+
+@compile_kernel
+def _lengthen(last: Neighbours, time: float, case: DualCase) -> Array:
+    """A primer for a time of flight [s] too short for any: that of the last flight found, made longer.
+
+    Its kink lies as long after the start.
+    """
+    x, known = new_extremal(), last.extremal.times[2]
+    set_neighbour(last, known, x)
+    primer = shift_kink(_lead(x, case), time - known, time)
+    primer[:THETA] *= _LONGER
+    return primer
+
+
+@compile_kernel
 def cover_by_neighbours(
     best: Neighbours, problem: PrimerProblem, times: Array, case: DualCase, aim: CoverAim
 ) -> TimeCover:
@@ -122,18 +182,20 @@ def cover_by_neighbours(
         The cover; its level is less than the aim's where the neighbours give no better one.
     """
     cells, best_time = times.size - 1, best.extremal.times[2]
-    primers, owner = np.empty((MOST_PRIMERS, 6)), np.zeros(cells, np.int64)
+    touching = touches(best.extremal)
+    most = MOST_KINKED if touching else MOST_PRIMERS
+    primers, owner = np.empty((most + 1, PRIMER_SIZE)), np.zeros(cells, np.int64)
     envelope = np.full(cells, -np.inf)
-    primers[0], primers[1] = last_primer(case, times[-1]), along_change(case)
-    for count in range(2):
-        _join_constant(primers[count], count, times, case, envelope, owner)
+    beyond = _join_constants(times, case, primers, envelope, owner)
     x, left, right = new_extremal(), best, best
     set_neighbour(best, best_time, x)
-    primer, level = primer_of(x, case), aim.target - aim.tolerance
-    farthest, tried, tries, best_value = np.full(2, np.inf), -1, 0, aim.target
+    primer, level = _lead(x, case), aim.target - aim.tolerance
+    best_value, farthest = aim.target, np.full(2, np.inf)
+    stride = np.full(2, _STRIDE * best_time if touching else np.inf)
+    tried, tries, most_tries = -1, 0, _TRIES + _FAILURES if touching else _TRIES
     count = 2
-    while count < MOST_PRIMERS:
-        primers[count] = primer
+    while count < most:
+        primers[count] = widen_primer(primer)
         join_cover(primer, count, times, case, envelope, owner)
         if count == 2:
             best_value = float(envelope[int(np.searchsorted(times, _BEFORE * best_time)) - 1])
@@ -141,28 +203,34 @@ def cover_by_neighbours(
         count += 1
         cell = nearest_open_cell(envelope, times, level, best_time)
         tries = tries + 1 if cell == tried else 0
-        if cell >= 0 and tries == _TRIES:  # its own primer does not bound it: no other one will
+        if cell >= 0 and tries == most_tries:  # its own primer does not bound it: no other one will
             level, tries = float(envelope[cell]), 0
             cell = nearest_open_cell(envelope, times, level, best_time)
         if cell < 0:
             break
-        time = 0.5 * (times[cell] + times[cell + 1])
-        primer, tried = two_impulse_primer(time, case), cell
-        if linear_part(primer, time, case) > _IMPULSES * level:
+        mark = 0.5 * (times[cell] + times[cell + 1])
+        primer, tried = two_impulse_primer(mark, case), cell
+        if linear_part(primer, mark, case) > _IMPULSES * level:
             continue
-        away, side = time - best_time, 0 if time < best_time else 1
-        if farthest[side] == np.inf or farthest[side] < _BEYOND * abs(away):
-            farthest[side] = min(_BEYOND * abs(away), _GROWTH * farthest[side])
-            time, tried = max(best_time + math.copysign(farthest[side], away), _EARLIEST * best_time), -1
-        there = neighbours_at(left if side == 0 else right, problem, time)
+        side = 0 if mark < best_time else 1
+        beside = left if side == 0 else right
+        time = _next_time(mark, beside, best_time, stride[side], farthest[side : side + 1])
+        there = neighbours_at(beside, problem, time)
         set_neighbour(there, time, x)
-        if x.times[0] < x.times[1] < x.times[2]:
-            primer = primer_of(x, case)
+        if _in_order(x):
+            primer, tried = _lead(x, case), cell if time == mark else -1
             if side == 0:
                 left = there
             else:
                 right = there
-    lowest = min(float(np.min(envelope)), linear_part(primers[0], times[-1], case))
+        elif touching:
+            primers[count] = _lengthen(beside, mark, case)
+            join_cover(primers[count], count, times, case, envelope, owner)
+            primer, count = _LONGER * _LONGER * primer, count + 1
+            stride[side] *= 0.5
+        else:
+            tried = cell if time == mark else -1
+    lowest = min(float(np.min(envelope)), beyond)
     return TimeCover(primers[:count].copy(), owner, lowest, best_time, best_value)
 
 
@@ -182,6 +250,6 @@ def bound_by_neighbours(
     Returns:
         [s] The grid of times, and the cover of its cells.
     """
-    aim = CoverAim(target, NEIGHBOUR_TOLERANCE * exhaust, -np.inf)
+    aim = CoverAim(target, (_LOOSER if touches(x) else 1.0) * NEIGHBOUR_TOLERANCE * exhaust, -np.inf)
     times = time_grid(case, target * (1.0 + 1e-12), x.times[2], _CELLS)
     return times, cover_by_neighbours(find_neighbours(x, problem), problem, times, case, aim)

@@ -90,7 +90,7 @@ def solve_pdg(
     """
     vectors = (target, gravity, target_velocity, angular_velocity)
     place, pull, arrival, spin = (cast("Array", vector) for vector in vectors)  # the problem checks them
-    limits = _with_shorthands(limits, glide_slope=glide_slope_limit, speed=speed_limit)
+    limits = with_shorthands(limits, glide_slope=glide_slope_limit, speed=speed_limit)
     problem = LandingProblem(State.parse(state), place, lander, pull, limits, arrival, spin)
     _check_choices(nodes, method, unreachable, guess)
     weight = _weight(landing_error_weight, method)
@@ -126,8 +126,8 @@ def replan(
     return answer(Request(problem, nodes, _seconds(time_of_flight), method, provisional=True), unreachable)
 
 
-def _with_shorthands(limits: Limits, **shorthands: float | None) -> Limits:
-    """The limits with those that were given by a keyword of their own, `NAME_limit`."""
+def with_shorthands(limits: Limits, **shorthands: float | None) -> Limits:
+    """The limits with those that were given by a keyword of their own, `NAME_limit`; ValueError for both."""
     if not isinstance(limits, Limits):
         raise ValueError(f"limits must be a Limits, got {limits!r}")
     for name, value in shorthands.items():

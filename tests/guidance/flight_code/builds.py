@@ -42,6 +42,7 @@ class Flight(ctypes.Structure):
         ("max_thrust", ctypes.c_double),
         ("primer", ctypes.c_double * 6),
         ("primer_times", ctypes.c_double * 2),
+        ("touch", ctypes.c_double * 2),
     ]
 
 
@@ -91,7 +92,8 @@ class Build:
         if told is not Finding.OPTIMAL:
             thrust = np.full(3, math.nan)
         status = STATUSES[flight.status]
-        return CodeAnswer(status, flight.propellant, flight.time_of_flight, flight.lower_bound, thrust)
+        told = flight.propellant, flight.time_of_flight, flight.lower_bound, thrust, flight.touch[0]
+        return CodeAnswer(status, *told)
 
     def words(self, status: int) -> str:
         return self.library.descent_words(status).decode()

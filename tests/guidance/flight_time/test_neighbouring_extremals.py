@@ -15,7 +15,7 @@ from guidance.flight_time.neighbouring_extremals import (
     new_extremal,
     set_neighbour,
 )
-from guidance.flight_time.primer_equations import solve_primer
+from guidance.flight_time.primer_equations import TOUCHING, residuals, solve_primer, solve_touching
 
 SHORTEST_BURN = 0.25  # [s] one that is shorter turns round within the delays below
 
@@ -117,3 +117,26 @@ def test_nothing_is_changed_in_place():
     assert np.array_equal(before[0], x.primer)
     assert np.array_equal(before[1], x.times)
     assert np.array_equal(before[1], known.extremal.times)
+
+
+def test_neighbours_of_a_flight_that_touches_the_ground_touch_it_to_second_order():
+    """All equations but the Hamiltonian: a step that is half as long misses them by a quarter."""
+    start = [-11.3, 0.4, 202.6, 17.4, 25.7, -48.7, 1194.5]
+    unit, flow = PAPER_LANDER.max_thrust / start[6], PAPER_LANDER.max_mass_flow / start[6]
+    place, speed = np.array(start[:3]) - TARGET, np.array(start[3:6])
+    problem, x = PrimerProblem(place / unit, speed / unit, GRAVITY / unit, flow), new_extremal()
+    assert solve_touching(problem, x)
+    known, out, missed = find_neighbours(x, problem), new_extremal(), np.empty(TOUCHING)
+
+    def miss(neighbours, time):
+        set_neighbour(neighbours, time, out)
+        residuals(out, problem, missed)
+        return float(np.linalg.norm(np.delete(missed, 6)))
+
+    assert miss(known, x.times[2]) < 1e-6
+    for delay in (-0.2, 0.2):
+        whole, half = (miss(known, x.times[2] + share * delay) for share in (1.0, 0.5))
+        assert 3.0 < whole / half < 5.0
+        corrected = neighbours_at(known, problem, x.times[2] + delay)
+        assert miss(corrected, x.times[2] + delay) < 0.05 * whole
+        assert out.touch[0] != x.touch[0]
