@@ -68,6 +68,7 @@ GROUPS: dict[str, dict[str, Command]] = {
         "look-statistics": Command(
             "hda.look_statistics", "LookStatistics", "what the belief knows of measured looks"
         ),
+        "verify": Command("studies.verify.command", "Verify", "check results: fly a share of them again"),
         "sample-size": Command("studies.sample_size", "SampleSize", "how many episodes a claim needs"),
     },
     "Measure": {

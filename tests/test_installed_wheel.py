@@ -85,6 +85,7 @@ RUNS: dict[str, tuple[list[str], list[str]]] = {
         [*SMALL, "--presets", "paper", "--weights", "none", "--policies", "no-divert", "--out", "traded"],
         ["traded/table.csv", "traded/trade-off.png"],
     ),
+    "studies.verify": (["flown", "--least", "1", "--workers", "1"], []),
 }
 """Command -> arguments of one small run, and what it must leave behind."""
 
@@ -209,9 +210,10 @@ def test_an_installed_command_explains_itself(installation: Installation, comman
 @pytest.mark.parametrize("command", RUNS)
 def test_an_installed_command_runs(installation: Installation, command: str) -> None:
     arguments, written = RUNS[command]
-    if command == "studies.failures":
-        failing = ["--policies", "no-divert", "--no-figures", "--no-report", "--out", "failing"]
-        assert installation.run("-m", "studies.compare", *SMALL, *failing).returncode == 0
+    if command in ("studies.failures", "studies.verify"):
+        folder = arguments[arguments.index("--study") + 1] if "--study" in arguments else arguments[0]
+        flown = ["--policies", "no-divert", "--no-figures", "--no-report", "--out", folder]
+        assert installation.run("-m", "studies.compare", *SMALL, *flown).returncode == 0
     done = installation.run("-m", command, *arguments)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "Traceback" not in done.stderr

@@ -18,7 +18,9 @@ from hda.sensing.ranging import PointCloud, RangingLidar
 
 STANDOFF = 0.15
 """[m] above the measured contact at which a site is put: about two sigma of that height, seen from 300 m. To
-fall so far costs 0.7 m/s; to meet the ground before the flight is at rest may cost more."""
+fall so far costs 0.7 m/s; to meet the ground before the flight is at rest may cost more.
+On 100 tuning episodes of `lidar`, 0, 0.075, 0.15 and 0.3 m land single-divert, nearest-safe and hazard-aware
+together 288, 291, 292 and 291 times of 300: chance alone may tell these apart."""
 
 
 @dataclass(frozen=True, eq=False)

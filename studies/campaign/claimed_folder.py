@@ -120,7 +120,7 @@ def _check_same_run(folder: Path, held: Path, identity: dict[str, Any]) -> None:
         raise FolderError(f"{folder} holds no finished work to go on from; --overwrite begins anew") from None
     except (ValueError, RecursionError) as error:
         raise FolderError(f"{held} is damaged ({error}); --overwrite begins anew") from error
-    differences = list(_differences(there, identity))
+    differences = list(name_differences(there, identity))
     if differences:
         shown = "; ".join(differences[:8])
         more = f"; and {len(differences) - 8} more" if len(differences) > 8 else ""
@@ -129,11 +129,11 @@ def _check_same_run(folder: Path, held: Path, identity: dict[str, Any]) -> None:
         )
 
 
-def _differences(there: Any, here: Any, name: str = "") -> Iterator[str]:
-    """Name every leaf in which two parsed JSON values differ."""
+def name_differences(there: Any, here: Any, name: str = "") -> Iterator[str]:
+    """Name every leaf in which two parsed JSON values differ: what it was there, and what it is here."""
     if isinstance(there, dict) and isinstance(here, dict):
         for key in sorted({*there, *here}):
-            yield from _differences(there.get(key), here.get(key), f"{name}.{key}" if name else key)
+            yield from name_differences(there.get(key), here.get(key), f"{name}.{key}" if name else key)
     elif there != here:
         yield f"{name} was {_short(there)}, is {_short(here)}"
 

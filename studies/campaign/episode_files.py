@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterable
 from itertools import islice
 from pathlib import Path
@@ -11,6 +10,12 @@ from hda.flight.episode_row import ROW_COLUMNS, EpisodeRow
 from studies.columns import file_number
 
 _ROWS_AT_ONCE = 5000  # rows of a group of the Parquet file
+
+
+def episode_line(row: EpisodeRow) -> str:
+    """A row as it stands in episodes.csv, without the line's end; no name in it has a comma."""
+    values = (getattr(row, name) for name in ROW_COLUMNS)
+    return ",".join(file_number(value) if isinstance(value, float) else str(value) for value in values)
 
 
 def write_episodes(folder: Path, rows: Iterable[EpisodeRow]) -> None:
@@ -24,12 +29,9 @@ def write_episodes(folder: Path, rows: Iterable[EpisodeRow]) -> None:
         (folder / "episodes.csv").open("w", newline="") as stream,
         parquet.ParquetWriter(folder / "episodes.parquet", schema) as tables,
     ):
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(ROW_COLUMNS)
+        stream.write(",".join(ROW_COLUMNS) + "\n")
         remaining = iter(rows)
         while group := list(islice(remaining, _ROWS_AT_ONCE)):
-            for row in group:
-                values = (getattr(row, name) for name in ROW_COLUMNS)
-                writer.writerow([file_number(v) if isinstance(v, float) else v for v in values])
+            stream.writelines(f"{episode_line(row)}\n" for row in group)
             columns = {name: [getattr(row, name) for row in group] for name in ROW_COLUMNS}
             tables.write_table(pa.table(columns, schema=schema))

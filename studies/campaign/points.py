@@ -18,7 +18,7 @@ from studies.campaign.claimed_folder import Existing
 from studies.campaign.episode_files import write_episodes
 from studies.campaign.executor import OpenExecutor, local_processes
 from studies.campaign.monte_carlo import Chunk, Study, chunk_bounds, fly_chunks, join_chunks, prepare_study
-from studies.campaign.provenance import describe_study, write_provenance
+from studies.campaign.provenance import describe_study, write_checksums, write_provenance
 from studies.campaign.study_folder import StudyFolder, open_study_folder
 
 Rows = dict[str, tuple[EpisodeRow, ...]]
@@ -149,4 +149,5 @@ def _finish_point(folder: StudyFolder) -> Rows:
     study, result = folder.study, join_chunks(folder.study, folder.read_chunks())
     write_episodes(folder.path, result.rows)
     write_provenance(folder.path / "provenance.json", describe_study(study, folder.describe_flight()))
+    write_checksums(folder.path)
     return {name: tuple(row for row in result.rows if row.policy == name) for name in study.policies}

@@ -29,6 +29,10 @@ _PACKAGES = (
     "numpy",
     "scipy",
 )
+CHECKSUMS = "checksums.sha256"
+"""Beside the products of a study: the SHA-256 of each, as `sha256sum --check` reads them."""
+_PRODUCT_FOLDERS = ("figures", "shards", "trajectories")
+
 _TRAINING_PACKAGES = ("sb3-contrib", "stable-baselines3", "torch")
 """Named in the provenance alone: they are optional, and no row depends on them."""
 
@@ -155,3 +159,23 @@ def _installed_versions(packages: Iterable[str]) -> dict[str, str]:
 def write_provenance(path: Path, provenance: dict[str, Any]) -> None:
     """Write a provenance as JSON."""
     path.write_text(json.dumps(provenance, indent=1, sort_keys=True, default=str) + "\n")
+
+
+def write_checksums(folder: Path) -> None:
+    """List every product of a study's folder with its digest."""
+    lines = [f"{digest_file(folder / name)}  {name}\n" for name in list_products(folder)]
+    (folder / CHECKSUMS).write_text("".join(lines))
+
+
+def list_products(folder: Path) -> list[str]:
+    """Paths of a study's products below its folder, with slashes, ascending; the checksums left out."""
+    files = [
+        file for place in ("*", *(f"{name}/*" for name in _PRODUCT_FOLDERS)) for file in folder.glob(place)
+    ]
+    names = (file.relative_to(folder).as_posix() for file in files if file.is_file() and file.name[0] != ".")
+    return sorted(name for name in names if name != CHECKSUMS)
+
+
+def digest_file(path: Path) -> str:
+    """SHA-256 of a file, in hexadecimal digits."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()

@@ -14,12 +14,13 @@ from typing import Any
 
 from studies.campaign.claimed_folder import Contents, Existing, claim_folder
 from studies.campaign.monte_carlo import Chunk, Study, chunk_bounds
-from studies.campaign.provenance import identify_study
+from studies.campaign.provenance import CHECKSUMS, identify_study
 from studies.campaign.shards import ShardError, read_shard, shard_path, write_shard
 
 _CONTENTS = Contents(
     identity="shards/study.json",
     products=(
+        CHECKSUMS,
         "episodes.csv",
         "episodes.parquet",
         "paired.csv",

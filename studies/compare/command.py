@@ -27,7 +27,7 @@ from studies.campaign.command_line import choose_policies, open_folder, resumabl
 from studies.campaign.episode_files import write_episodes
 from studies.campaign.executor import OpenExecutor, local_processes
 from studies.campaign.monte_carlo import Study
-from studies.campaign.provenance import describe_study, write_provenance
+from studies.campaign.provenance import describe_study, write_checksums, write_provenance
 from studies.campaign.run_options import KeepingOptions
 from studies.campaign.study_folder import StudyFolder, open_study_folder
 from studies.compare.differences import compare_pairs, write_paired
@@ -232,7 +232,7 @@ def compare(options: Comparison) -> list[PolicySummary]:
 
 
 def write_results(folder: StudyFolder, study: Study, options: Comparison) -> list[PolicySummary]:
-    """Write every product of a flown study, reading its chunks one at a time."""
+    """Write every product of a flown study, reading its chunks one at a time; their checksums last."""
     out = folder.path
     scores = score_study(study.policies, REFERENCE_POLICY, folder.read_chunks())
     summaries = summarize_study(study, scores)
@@ -260,6 +260,7 @@ def write_results(folder: StudyFolder, study: Study, options: Comparison) -> lis
     if options.report:
         report_study(out, ReportContent(study, scores, summaries, differences, provenance), options.workers)
     write_provenance(out / "provenance.json", provenance)
+    write_checksums(out)
     return summaries
 
 
