@@ -1,13 +1,13 @@
 """What a plan leaves to the feedback for an engine that gives less, or more, than is commanded of it.
 
-The relative error e of the thrust is bounded, |e| <= b, and constant between two looks. The feedback learns it
-from the first control period of a burn; until then it must assume something.
+The relative error e of the thrust is bounded, |e| <= b, and constant between two looks. The feedback learns
+it from the first control period of a burn; until then it must assume something.
 
-At full command the thrust is (1 + e) T >= (1 - b) T. So every engine within the bound can fly a plan that asks
-for no more than (1 - m) T with m >= b, once its error is known. What the first period of a burn lacks must be
-made up for by the next. Where these have nothing to spare, in the midst of the last burn, the engine is taken
-for a weak one until it is felt. Elsewhere it is taken as it is: an early thrust that turns out too great costs
-propellant, and a weak one can be mended.
+At full command the thrust is (1 + e) T >= (1 - b) T. So every engine within the bound can fly a plan that
+asks for no more than (1 - m) T with m >= b, once its error is known. What the first period of a burn lacks
+must be made up for by the next. Where these have nothing to spare, in the midst of the last burn, the engine
+is taken for a weak one until it is felt. Elsewhere it is taken as it is: an early thrust that turns out too
+great costs propellant, and a weak one can be mended.
 """
 
 from __future__ import annotations

@@ -73,7 +73,9 @@ class PlannedDescent:
             return self._track(observation, remaining, DecisionStatus.NOMINAL, memory)
         landing = self._plan(observation, site, memory, remaining if same_site else None)
         if same_site and remaining is not None and (landing is None or landing.reference is None):
-            return self._track(observation, remaining, DecisionStatus.NOMINAL, memory)  # the plan in flight is still good
+            return self._track(
+                observation, remaining, DecisionStatus.NOMINAL, memory
+            )  # the plan in flight is still good
         if landing is not None and landing.reference is not None:
             nearest = landing.status is PlanStatus.NEAREST
             status = DecisionStatus.FALLBACK_NEAREST if nearest else DecisionStatus.NOMINAL
@@ -99,7 +101,9 @@ class PlannedDescent:
             return None
         periods = None if remaining is None else remaining.thrust_acceleration.shape[0]
         options = self.options_for(view)
-        return plan_soft_landing(state, site, view.lander, view.control_period, options, view.gravity, periods)
+        return plan_soft_landing(
+            state, site, view.lander, view.control_period, options, view.gravity, periods
+        )
 
     def options_for(self, view: ScenarioView) -> SoftLandingOptions:
         """How plans are made for this lander: with a margin that bears its engine."""
@@ -114,9 +118,7 @@ class PlannedDescent:
         if not self.bears_engine:
             return PlanCommand(reference, gains)
         greatest, margin = view.lander.max_thrust / mass, self.options_for(view).thrust_margin
-        assumed = assumed_error(
-            reference, greatest, view.rules.thrust_error, margin, view.control_periods
-        )
+        assumed = assumed_error(reference, greatest, view.rules.thrust_error, margin, view.control_periods)
         return PlanCommand(reference, gains, assumed)
 
     def _track(
