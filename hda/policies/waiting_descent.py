@@ -32,9 +32,8 @@ class WaitingMemory:
 class WaitingDescent:
     """As `AdjustedDescent`, but as long as no look has brought a map the landing is put off.
 
-    While less than `look_time` is left of the flight and nothing was seen, each look plans a landing one
-    decision interval later than the last plan: the next look comes about as long before the landing as this
-    one. It ends with the first map, or where the flight would leave less than `reserve` of the propellant on
+    While no more than `look_time` is left of the flight and nothing was seen, each look plans a landing one
+    decision interval later than the last plan: the next look comes as long before the landing as this one. It ends with the first map, or where the flight would leave less than `reserve` of the propellant on
     board. On a sensor that always brings a map it is `AdjustedDescent`.
 
     Attributes:
@@ -75,7 +74,7 @@ class WaitingDescent:
     def _later(
         self, observation: Observation, site: Array, descent: DescentMemory
     ) -> TrackingReference | None:
-        """A landing one decision interval after the last plan's; None where it is not time or not affordable."""
+        """A landing one decision interval after the last plan's; None where it is too early or too dear."""
         view, state, remaining = descent.view, observation.state, descent.reference
         if remaining is None or remaining.duration > self.look_time:
             return None
