@@ -34,8 +34,8 @@ class WaitingDescent:
 
     While no more than `look_time` is left of the flight and nothing was seen, each look plans a landing one
     decision interval later than the last plan: the next look comes as long before the landing as this one. It
-    ends with the first map, or where the flight would leave less than `reserve` of the propellant on board. On
-    a sensor that always brings a map it is `AdjustedDescent`.
+    ends with the first map, or where the flight would leave less than `reserve` of the propellant on board.
+    On a sensor that always brings a map it is `AdjustedDescent`.
 
     Attributes:
         adjusted: flies otherwise.
