@@ -18,6 +18,7 @@ from typing import Any, Literal, TypeVar, cast
 import numba
 import platformdirs
 from numba.core import config
+from numba.core.caching import IndexDataCacheFile
 
 Function = TypeVar("Function", bound=Callable[..., object])
 _numba_config = cast("Any", config)  # numba names its settings at run time
@@ -45,6 +46,23 @@ def kernel_folder() -> Path:
     return cache_folder() / "kernels" / source_hash()
 
 
+class _SignatureFiles(IndexDataCacheFile):
+    """A kernel's files of compiled code, each named after the types of its arguments.
+
+    numba numbers them, so that two processes that compile a kernel for different types at the same time may
+    give both the same number, and one of them later runs the other's code.
+    """
+
+    def save(self, key: Any, data: Any) -> None:
+        """Keep the code of one signature: before the index names it, so that no reader misses it."""
+        stem = self._index_name.removesuffix(".nbi")
+        name = f"{stem}.{hashlib.sha256(repr(key).encode()).hexdigest()[:16]}.nbc"
+        self._save_data(name, data)
+        overloads = self._load_index()
+        if overloads.get(key) != name:
+            self._save_index({**overloads, key: name})
+
+
 def compile_kernel(
     function: Function, *, parallel: bool = False, error_model: Literal["python", "numpy"] = "python"
 ) -> Function:
@@ -59,6 +77,7 @@ def compile_kernel(
     try:
         _numba_config.CACHE_DIR = str(kernel_folder())
         compiled.enable_caching()
+        cast("Any", compiled)._cache._cache_file.__class__ = _SignatureFiles
     except (RuntimeError, OSError):
         pass  # nowhere to write: compile in memory
     finally:

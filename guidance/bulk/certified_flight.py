@@ -184,6 +184,7 @@ def bound_start(
         vehicle.sine,
         0.0,
         0.0,  # no limit on the path: its flight keeps them
+        False,
     )
     times, cover = bound_by_neighbours(x, problem, case, target, exhaust)
     return Bound(most, times, cover)

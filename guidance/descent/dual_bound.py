@@ -83,6 +83,12 @@ class DualBound:
         return state.mass * -math.expm1(-self.bound / self.problem.lander.exhaust_velocity)
 
     @property
+    def anywhere(self) -> bool:
+        """Whether it speaks of landings anywhere in the target's plane: no primer asks where."""
+        asked = (piece.primer[3:5].any() or piece.path_multiplier[:2].any() for piece in self.pieces)
+        return not any(asked)
+
+    @property
     def verified(self) -> bool:
         """Whether the proof holds: the pieces follow one another, and each bounds all of its times."""
         if not self._well_formed():
@@ -94,8 +100,13 @@ class DualBound:
         """Whether the claim implies that no flight burns less than `lower_bound` [kg]; inf: there is none."""
         if math.isfinite(lower_bound):
             return lower_bound <= self.propellant * (1.0 + 1e-12)
+        return self.shortest == 0.0 and math.isinf(self.longest) and self.above_tank
+
+    @property
+    def above_tank(self) -> bool:
+        """Whether the claim is that the tank pays for no flight of the times that it speaks of."""
         tank = self.problem.lander.exhaust_velocity * self.problem.log_mass_ratio
-        return self.shortest == 0.0 and math.isinf(self.longest) and self.bound >= tank * (1.0 - 1e-6)
+        return self.bound >= tank * (1.0 - 1e-6)
 
     def _well_formed(self) -> bool:
         """Whether the numbers are numbers, and the pieces cover the claimed times without a hole."""
@@ -190,6 +201,30 @@ class DualBound:
             there = problem.offset + before * v + 0.5 * before**2 * g
             bounds = bounds - np.where(kinked, there @ piece.path_multiplier, 0.0)
         return bounds, 0.125 * steps**2 * np.maximum(bend, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class OuterBound:
+    """The tank pays for no flight but perhaps within a span of times: two dual bounds.
+
+    Attributes:
+        before: of all times up to the span.
+        after: of all times from its end on.
+    """
+
+    before: DualBound
+    after: DualBound
+
+    @property
+    def verified(self) -> bool:
+        """Whether both proofs hold."""
+        return self.before.verified and self.after.verified
+
+    def supports(self, lower_bound: float) -> bool:
+        """Whether the claims imply that there is no flight outside the span; nothing else is claimed."""
+        before, after = self.before, self.after
+        outside = before.shortest == 0.0 and before.longest <= after.shortest and math.isinf(after.longest)
+        return math.isinf(lower_bound) and outside and before.above_tank and after.above_tank
 
 
 @dataclass(frozen=True)

@@ -126,8 +126,10 @@ def copy_extremal(x: Extremal, out: Extremal) -> None:
 @compile_kernel
 def in_unit(problem: PrimerProblem, unit: float) -> PrimerProblem:
     """A problem in seconds with `unit` seconds as its unit of time."""
-    r, v, g, flow = problem
-    return PrimerProblem(r / (unit * unit), v / unit, g, flow * unit)
+    r, v, square = np.empty(3), np.empty(3), unit * unit
+    for axis in range(3):
+        r[axis], v[axis] = problem.position[axis] / square, problem.velocity[axis] / unit
+    return PrimerProblem(r, v, problem.gravity, problem.mass_flow * unit)
 
 
 @compile_kernel

@@ -24,6 +24,13 @@ _SHORTEST = 0.01  # of the longest time tried
 
 
 @compile_kernel
+def _make_unit(vector: Array) -> None:
+    length = math.sqrt(dot(vector, vector))
+    for axis in range(3):
+        vector[axis] /= length
+
+
+@compile_kernel
 def guess_suicide_burn(problem: PrimerProblem, first_burn: bool, x: Extremal) -> bool:
     """A suicide burn along the vertical, and two sideways impulses, at the start and in it.
 
@@ -37,21 +44,26 @@ def guess_suicide_burn(problem: PrimerProblem, first_burn: bool, x: Extremal) ->
     """
     r, v, gravity, _ = problem
     g = math.sqrt(dot(gravity, gravity))
-    up = -gravity / g
+    up, across, kick, speed = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    q1, q2 = x.primer[0], x.primer[1]
+    for axis in range(3):
+        up[axis] = -gravity[axis] / g
     height, climb = dot(r, up), dot(v, up)
     coast = (2.0 * (1.0 - g) * height - climb * climb) / 2.0
     ignition_speed = math.sqrt(max(climb * climb + 2.0 * g * coast, 1e-6 * g * abs(height)))
     t2 = max((ignition_speed + climb) / g, 1e-2 * ignition_speed / g)
     final = t2 + ignition_speed / (1.0 - g)
-    across = (r - height * up) / (0.5 * (t2 + final))
-    kick = -across - (v - climb * up)
+    mean_time, braking_speed = 0.5 * (t2 + final), ignition_speed + g * (final - t2)
+    for axis in range(3):
+        across[axis] = (r[axis] - height * up[axis]) / mean_time
+        kick[axis] = -across[axis] - (v[axis] - climb * up[axis])
+        speed[axis] = v[axis] + kick[axis]
+        q2[axis] = across[axis] + braking_speed * up[axis]
     size = math.sqrt(dot(kick, kick))
-    q2 = across + (ignition_speed + g * (final - t2)) * up
-    q2 /= math.sqrt(dot(q2, q2))
+    _make_unit(q2)
     t1 = min(t2 - 2.0 * ignition_speed / g, -1e-3 * t2)
     if first_burn and size > 1e-9 * ignition_speed:
         t1 = size if size < 0.8 * t2 else _LATEST_FIRST_BURN * t2
-        speed = v + kick
         sine, cosine = 1.0, 0.0
         for _ in range(5):  # the Hamiltonian at t1
             gap = dot(speed, up) - g * (t2 - t1)
@@ -60,12 +72,12 @@ def guess_suicide_burn(problem: PrimerProblem, first_burn: bool, x: Extremal) ->
             cosine = (dot(q2, speed) - sine * dot(kick, speed) / size) / gap
             cosine = min(max(cosine, -0.95), 0.95)
             sine = math.sqrt(1.0 - cosine * cosine)
-        q1 = sine * kick / size + cosine * up
+        for axis in range(3):
+            q1[axis] = sine * kick[axis] / size + cosine * up[axis]
     else:
-        q1 = 0.1 * kick / ignition_speed - up
-        q1 /= math.sqrt(dot(q1, q1))
-    for axis in range(3):
-        x.primer[0, axis], x.primer[1, axis] = q1[axis], q2[axis]
+        for axis in range(3):
+            q1[axis] = 0.1 * kick[axis] / ignition_speed - up[axis]
+        _make_unit(q1)
     x.times[0], x.times[1], x.times[2] = t1, t2, final
     return abs(dot(q1, q1) - 1.0) < _UNIT and abs(dot(q2, q2) - 1.0) < _UNIT
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from guidance.flight_time.extremal import Extremal, PrimerProblem, copy_extremal, new_extremal
-from guidance.flight_time.primer_equations import solve_from
+from guidance.flight_time.extremal import Extremal, PrimerProblem, copy_extremal, new_extremal, touches
+from guidance.flight_time.primer_equations import HELD, TOUCHING_HELD, solve_from
 from guidance.kernel import compile_kernel
 
 _FARTHEST = 3.0  # ratio of times of flight
@@ -46,6 +46,10 @@ def _solve_near(time: float, problem: PrimerProblem, x: Extremal) -> bool:
     change = time - x.times[2]
     if change == 0.0:
         return True
+    if touches(x):
+        x.times[1] *= time / x.times[2]
+        x.times[2] = time
+        return solve_from(x, problem, TOUCHING_HELD)
     start = new_extremal()
     copy_extremal(x, start)
     for attempt in range(2):
@@ -54,7 +58,7 @@ def _solve_near(time: float, problem: PrimerProblem, x: Extremal) -> bool:
             _light_first_burn(x, change)
         x.times[1] *= time / x.times[2]
         x.times[2] = time
-        if solve_from(x, problem, 6):
+        if solve_from(x, problem, HELD):
             return True
     return False
 

@@ -20,12 +20,14 @@ import numpy as np
 
 from guidance.arrays import Array
 from guidance.descent.problem import LandingProblem
+from guidance.flight_time.continuation import solve_touching_from_edge
 from guidance.flight_time.extremal import (
     Extremal,
     PrimerProblem,
     blank_extremal,
     copy_extremal,
     new_extremal,
+    touches,
 )
 from guidance.flight_time.path_limits import ALTITUDE, KEPT, PROPELLANT, burnt_share
 from guidance.flight_time.primer_equations import FREE, TOUCHING, solve_from, solve_touching
@@ -35,10 +37,15 @@ from guidance.kernel import compile_kernel
 ERROR_SHARE, ERROR_SLACK = 1e-3, 0.05
 """Of the least landing error, and [m] beside it: how much farther from the target the cheapest flight is."""
 _MOST_STEPS = 30
-_MOST_HALVINGS = 12
+_MOST_HALVINGS = 6
+_MOST_SHORT_STEPS = 3  # in a row, a quarter of the full step or less: it leads nowhere
 _CONVERGED = 1e-9  # of the square of the time of flight: millimetres
 _DIFFERENCE = 1e-5  # of the same
 _LONGEST = 0.1  # of the same: step
+_FULL = 1.0 - 1e-9  # of the tank: the nearest landing leaves that little of it
+_MOST_FAILURES = 6  # on the way to an empty tank
+_SHORT_COAST = 0.1  # of the time of flight: one so short is vanishing
+_SLIVER = 1e-2  # of the time of flight: a first burn so short may have to vanish
 
 
 @compile_kernel
@@ -112,6 +119,7 @@ def solve_nearest(
     here, there, moved, trial = np.empty(2), np.empty(2), np.empty(2), new_extremal()
     if not _set_misses(point, x, problem, goal, here):
         return False
+    short = 0
     for _ in range(_MOST_STEPS):
         unit = x.times[2] ** 2
         before = math.hypot(here[0], here[1])
@@ -122,6 +130,7 @@ def solve_nearest(
         if math.isnan(east):
             return False
         damping, better = min(1.0, _LONGEST * unit / max(math.hypot(east, north), 1e-300)), False
+        enough = 0.3 * damping
         for _ in range(_MOST_HALVINGS):
             moved[0], moved[1] = point[0] + damping * east, point[1] + damping * north
             copy_extremal(x, trial)
@@ -130,7 +139,8 @@ def solve_nearest(
             if better:
                 break
             damping *= 0.5
-        if not better:
+        short = short + 1 if damping < enough else 0
+        if not better or short > _MOST_SHORT_STEPS:
             return False
         copy_extremal(trial, x)
         point[0], point[1], here[0], here[1] = moved[0], moved[1], there[0], there[1]
@@ -139,69 +149,136 @@ def solve_nearest(
 
 @dataclass(frozen=True, eq=False)
 class NearestLanding:
-    """A flight to a point near the target.
+    """A flight to a point near the target, or what is left of the search for one.
 
     Attributes:
         problem: the landing there.
-        flight: the flight of least propellant to it.
+        flight: the flight of least propellant to it; None where none was found.
+        time: [s] its time of flight; without one, that of the last extremal on the way to it.
     """
 
     problem: LandingProblem
-    flight: PrimerFlight
+    flight: PrimerFlight | None
+    time: float
 
 
-def find_nearest_landing(problem: LandingProblem, overdrawn: PrimerFlight) -> NearestLanding | None:
+def find_nearest_landing(
+    problem: LandingProblem, overdrawn: PrimerFlight, thorough: bool = True
+) -> NearestLanding:
     """The cheapest flight to within a little more than the least landing error that the tank pays for.
 
     Args:
         problem: the landing problem.
         overdrawn: its extremal, which burns more than there is.
+        thorough: whether fuller tanks may lead there, or the cheapest flight be given up for the nearest.
 
     Returns:
-        The flight; None where none was found, or the one found breaks a limit of the problem.
+        The flight; or none, where none was found or the one found breaks a limit of the problem.
     """
+    none = NearestLanding(problem, None, overdrawn.time)
     if overdrawn.broken != PROPELLANT or problem.limits.line_of_sight is not None:
-        return None
+        return none
     x, unit = blank_extremal(), problem.lander.max_thrust / problem.state.mass
     copy_extremal(overdrawn.extremal, x)
     goal = -math.expm1(-problem.log_mass_ratio), ERROR_SLACK / unit
-    point, touching = np.zeros(2), False
-    while _seek_nearest(overdrawn.scaled, goal, touching, x, point):
+    point, touching = np.zeros(2), thorough and bool(touches(x))
+    for attempt in range(2):
+        found = _seek_nearest(overdrawn.scaled, goal, (touching, attempt > 0, thorough), x, point)
+        none = replace(none, time=float(x.times[2]))
+        if not found:
+            return none
         target = problem.target.copy()
         target[:2] += unit * point
         there = replace(problem, target=target)
         flight = fly_to(there, x, TOUCHING if touching else FREE)
-        if flight is None or flight.broken == KEPT:
-            return None if flight is None else NearestLanding(there, flight)
-        if touching or flight.broken != ALTITUDE:
-            return None
+        if flight is not None and flight.broken == KEPT:
+            return NearestLanding(there, flight, flight.time)
+        if flight is None or touching or flight.broken != ALTITUDE:
+            return none
         touching = True
-    return None
+    return none
+
+
+@compile_kernel
+def _by_fuller_tanks(
+    problem: PrimerProblem, share: float, begin: tuple[Extremal, Array], x: Extremal, point: Array
+) -> bool:
+    """Find the nearest landing point that a share of the start mass pays for, where Newton's method has not.
+
+    If the first burn vanishes on the way, without one; else from the start by way of tanks that hold more,
+    unless it is the coast that vanishes.
+
+    Args:
+        problem: that of the target, in seconds.
+        share: of the start mass that is propellant.
+        begin: the extremal from which it began, and its point; changed in place.
+        x: the extremal at which it stopped; the answer.
+        point: the same.
+    """
+    if 0.0 < x.times[0] < _SLIVER * x.times[2]:
+        x.times[0] = -x.times[0]
+        if solve_nearest(point, problem, (share, math.nan), FREE, x):
+            return True
+    if x.times[1] - max(x.times[0], 0.0) < _SHORT_COAST * x.times[2]:
+        return False
+    known, there = begin
+    burnt, failures, done, step = burnt_share(known, problem.mass_flow), 0, 0.0, 0.5
+    while failures < _MOST_FAILURES and done < 1.0:
+        copy_extremal(known, x)
+        point[:] = there
+        goal = burnt + min(done + step, 1.0) * (share - burnt)
+        if solve_nearest(point, problem, (goal, math.nan), FREE, x):
+            done += step
+            step *= 2.0
+            copy_extremal(x, known)
+            there[:] = point
+        else:
+            step *= 0.4
+            failures += 1
+    return done >= 1.0
 
 
 @compile_kernel
 def _seek_nearest(
-    problem: PrimerProblem, goal: tuple[float, float], touching: bool, x: Extremal, point: Array
+    problem: PrimerProblem,
+    goal: tuple[float, float],
+    how: tuple[bool, bool, bool],
+    x: Extremal,
+    point: Array,
 ) -> bool:
     """Find the cheapest landing within the granted error, in place.
 
     Args:
         problem: that of the target, in seconds.
         goal: the share of the start mass that is propellant, and the error granted beside ERROR_SHARE.
-        touching: whether the flight touches the ground; `point` is then near the answer.
+        how: whether the flight touches the ground; whether it is still to be found, and `point` is near the
+            answer; and whether to be thorough, as of `find_nearest_landing`.
         x: the extremal to the point; the answer.
         point: where to begin; the answer.
     """
     share, slack = goal
+    touching, anew, thorough = how
     size = TOUCHING if touching else FREE
-    if touching:
+    if anew:
         r, v, g, flow = problem
         place = r.copy()
         place[0], place[1] = r[0] - point[0], r[1] - point[1]
-        if not solve_touching(PrimerProblem(place, v, g, flow), x):
+        there = PrimerProblem(place, v, g, flow)
+        found = solve_touching(there, x) or (thorough and solve_touching_from_edge(there, x))
+        if not found or not x.touch[1] > 0.0:
             return False
-    if not solve_nearest(point, problem, (share, math.nan), size, x):
+    known, begin, tank = new_extremal(), point.copy(), share * _FULL if thorough else share
+    copy_extremal(x, known)
+    found = solve_nearest(point, problem, (tank, math.nan), size, x)
+    if not found and thorough and not touching:
+        found = _by_fuller_tanks(problem, tank, (known, begin), x, point)
+    if not found:
         return False
-    near = math.hypot(point[0], point[1])
-    far = (1.0 + ERROR_SHARE) * near + slack
-    return solve_nearest(point, problem, (share, far), size, x)
+    copy_extremal(x, known)
+    begin[:] = point
+    far = (1.0 + ERROR_SHARE) * math.hypot(point[0], point[1]) + slack
+    if solve_nearest(point, problem, (share, far), size, x):
+        return True
+    copy_extremal(known, x)
+    point[:] = begin
+    return thorough

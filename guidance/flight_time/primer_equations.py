@@ -22,6 +22,7 @@ powered descent); Bryson, Denham and Dreyfus, AIAA Journal 1(11), 1963 (limits o
 from __future__ import annotations
 
 import math
+from typing import cast
 
 import numpy as np
 
@@ -46,8 +47,12 @@ LEAST_PULL, MOST_PULL = 1e-6, 0.98
 """Between these lies the square of gravity over full thrust per start mass."""
 ANGLES = 4
 """Of the numbers of a step: two for each primer; three times follow, then those of a touch."""
-FREE, TOUCHING = 7, 9
-"""Equations and unknowns of a flight, and of one that touches the ground."""
+FREE, TOUCHING = cast("tuple[int, int]", (np.int64(7), np.int64(9)))
+"""Equations and unknowns of a flight, and of one that touches the ground. They are numpy's: numba compiles a
+kernel anew for each number of Python's that another kernel hands to it."""
+HELD, TOUCHING_HELD = cast("tuple[int, int]", (np.int64(6), np.int64(8)))
+"""The same where the time of flight is held, and the Hamiltonian need not vanish."""
+_TIME = 6  # place of the time of flight among the unknowns, and of the Hamiltonian among the equations
 
 
 @compile_kernel
@@ -107,12 +112,15 @@ def _set_frame(x: Extremal, frame: Array) -> None:
         for i in range(1, 3):
             if abs(q[i]) < abs(q[axis]):
                 axis = i
-        first = -q[axis] * q
+        first, tilt = frame[2 * k], -q[axis]
+        for i in range(3):
+            first[i] = tilt * q[i]
         first[axis] += 1.0
-        first /= math.sqrt(dot(first, first))
+        size = math.sqrt(dot(first, first))
+        for i in range(3):
+            first[i] /= size
         for i in range(3):
             j, h = (i + 1) % 3, (i + 2) % 3
-            frame[2 * k, i] = first[i]
             frame[2 * k + 1, i] = q[j] * first[h] - q[h] * first[j]
 
 
@@ -173,11 +181,14 @@ def set_jacobian(
 def _newton_step(
     x: Extremal, problem: PrimerProblem, here: Array, size: int, frame: Array, trial: Extremal
 ) -> tuple[Array, bool]:
-    """Full step towards a root in the first `size` unknowns, from a difference Jacobian; if there is one."""
+    """Full step towards a root of so many equations, from a difference Jacobian; if there is one."""
     jacobian = np.empty((here.size, here.size))
     set_jacobian(x, problem, here, frame, trial, jacobian)
-    full = -here[:size]
-    found = solve_linear(jacobian[:size, :size], full)
+    if size == TOUCHING_HELD:
+        jacobian[_TIME, :], jacobian[_TIME, _TIME] = 0.0, 1.0
+    count = TOUCHING if size == TOUCHING_HELD else size
+    full = -here[:count]
+    found = solve_linear(jacobian[:count, :count], full)
     for value in full:
         found = found and math.isfinite(value)
     return full, found
@@ -185,29 +196,34 @@ def _newton_step(
 
 @compile_kernel
 def _newton(x: Extremal, problem: PrimerProblem, size: int) -> bool:
-    """Damped Newton, in place, on the first `size` unknowns and equations; whether it converged."""
-    count = max(size, FREE)
+    """Damped Newton, in place, on so many unknowns and equations, as of `solve_from`; if it converged."""
+    count, held = TOUCHING if size > FREE else FREE, size == TOUCHING_HELD
+    solved = TOUCHING if held else size
     frame, step, trial = np.empty((4, 3)), np.zeros(count), new_extremal()
     here, there = np.empty(count), np.empty(count)
     if not _admitted(x, problem.mass_flow):
         return False
     residuals(x, problem, here)
     for _ in range(_MOST_STEPS):
-        if _norm(here[:size]) < _CONVERGED:
+        if held:
+            here[_TIME] = 0.0
+        if _norm(here[:solved]) < _CONVERGED:
             return True
         full, found = _newton_step(x, problem, here, size, frame, trial)
         if not found:
             return False
         turn, delay = _norm(full[:ANGLES]), _norm(full[ANGLES + 1 : FREE])
         damping = min(1.0, 0.7 / max(1e-9, turn), 0.5 / max(1e-9, delay))
-        before, better = _length(here[:size]), False
+        before, better = _length(here[:solved]), False
         for _ in range(12):
-            for number in range(size):
+            for number in range(solved):
                 step[number] = damping * full[number]
             move_extremal(x, frame, step, trial)
             if _admitted(trial, problem.mass_flow):
                 residuals(trial, problem, there)
-                if _length(there[:size]) < (1.0 - 0.1 * damping) * before:
+                if held:
+                    there[_TIME] = 0.0
+                if _length(there[:solved]) < (1.0 - 0.1 * damping) * before:
                     better = True
                     break
             damping *= 0.5
@@ -215,7 +231,7 @@ def _newton(x: Extremal, problem: PrimerProblem, size: int) -> bool:
             return False
         copy_extremal(trial, x)
         here, there = there, here
-    return _norm(here[:size]) < _CONVERGED
+    return _norm(here[:solved]) < _CONVERGED
 
 
 @compile_kernel
@@ -225,7 +241,7 @@ def solve_from(x: Extremal, problem: PrimerProblem, size: int) -> bool:
     Args:
         x: a guess in seconds; the answer.
         problem: in seconds.
-        size: FREE, or TOUCHING; or 6 to hold the time of flight, where the Hamiltonian need not vanish.
+        size: FREE or TOUCHING; or HELD or TOUCHING_HELD.
     """
     unit = x.times[2]
     for k in range(3):
@@ -253,9 +269,9 @@ def solve_primer(problem: PrimerProblem, x: Extremal) -> bool:
     if not LEAST_PULL < dot(g, g) < MOST_PULL or not dot(r, g) < 0.0:
         return False
     for attempt in range(2):
-        if guess_suicide_burn(problem, attempt == 0, x) and solve_from(x, problem, 7):
+        if guess_suicide_burn(problem, attempt == 0, x) and solve_from(x, problem, FREE):
             return True
-    return guess_impulses(problem, x) and solve_from(x, problem, 7)
+    return guess_impulses(problem, x) and solve_from(x, problem, FREE)
 
 
 @compile_kernel
@@ -267,9 +283,9 @@ def solve_touching(problem: PrimerProblem, x: Extremal) -> bool:
         x: the answer, in seconds.
 
     Returns:
-        Whether it was found, and the ground bends its primer as it may: upward.
+        Whether it was found. The ground bends its primer as it may where c > 0, upward.
     """
     pull = problem.gravity
     if not LEAST_PULL < dot(pull, pull) < MOST_PULL or not guess_touch(problem, x):
         return False
-    return solve_from(x, problem, TOUCHING) and x.touch[1] > 0.0
+    return solve_from(x, problem, TOUCHING)

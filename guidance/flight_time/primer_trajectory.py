@@ -185,10 +185,13 @@ def _states(x: Extremal, problem: PrimerProblem, times: Array) -> Array:
     out, state, time = np.empty((times.size, 7)), np.empty(7), math.inf
     for k in range(times.size):
         if times[k] < time:  # times need not rise
-            state[:3], state[3:6] = problem.position, problem.velocity
+            for axis in range(3):
+                state[axis], state[3 + axis] = problem.position[axis], problem.velocity[axis]
             state[6], time = 1.0, 0.0
         advance_extremal(x, problem, time, times[k], state)
-        out[k], time = state, times[k]
+        time = times[k]
+        for number in range(7):
+            out[k, number] = state[number]
     return out
 
 
@@ -219,5 +222,6 @@ def _lay(
             position[k, axis] = scale * states[k, axis] + ends[2][axis]
             velocity[k, axis] = scale * states[k, 3 + axis]
         mass[k] = start_mass * states[k, 6]
-    position[0], velocity[0] = ends[0], ends[1]
+    for axis in range(3):
+        position[0, axis], velocity[0, axis] = ends[0][axis], ends[1][axis]
     return time, position, velocity, mass, thrust

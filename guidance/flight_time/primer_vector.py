@@ -13,6 +13,7 @@ import numpy as np
 
 from guidance.arrays import Array
 from guidance.descent.problem import LandingProblem
+from guidance.flight_time.continuation import solve_from_impulses, solve_touching_from_edge
 from guidance.flight_time.extremal import (
     Extremal,
     PrimerProblem,
@@ -112,32 +113,48 @@ def find_primer_flight(problem: LandingProblem, time: float | None = None) -> Pr
         The flight; None where none was found, where the engine cannot stop or cannot lift the vehicle, where
         the flight does not end at rest, where the frame turns, where the thrust may not jump, where gravity
         vanishes, or where the flight breaks a limit of the problem: the method knows none but a touch of the
-        ground, and that, like a flight without a coast, for the best time alone.
+        ground. A flight without a coast it knows for the best time alone.
     """
     flight = find_extremal_flight(problem, time)
     return None if flight is None or flight.broken else flight
 
 
-def find_extremal_flight(problem: LandingProblem, time: float | None = None) -> PrimerFlight | None:
-    """The same, and a flight too that breaks a limit of the problem or overdraws the tank: it says which."""
+def find_extremal_flight(
+    problem: LandingProblem, time: float | None = None, thorough: bool = True
+) -> PrimerFlight | None:
+    """The same, and a flight too that breaks a limit of the problem or overdraws the tank: it says which.
+
+    Args:
+        problem: the landing problem.
+        time: [s] of flight; None for the best one.
+        thorough: whether easier problems may lead there (`continuation`), and a touch at a given time.
+    """
     lander = problem.lander
     if lander.min_thrust > 0.0 or not problem.ends_at_rest or problem.rotates:
         return None
     if problem.limits.thrust_rate is not None:
         return None
     scaled, x, vehicle = scale_landing(problem), blank_extremal(), _vehicle(problem)
-    flight = _read(problem, scaled, x, _seek(scaled, vehicle, math.nan if time is None else time, x))
+    held = math.nan if time is None else time
+    flight = _read(problem, scaled, x, _seek(scaled, vehicle, held, x))
     if flight is not None and flight.broken != ALTITUDE:
         return flight
-    if time is not None or find_ground_contact(problem) is not None:
+    if (time is not None and not thorough) or find_ground_contact(problem) is not None:
         return flight
-    if flight is None:
+    seeks = (_seek_full_burn, _seek_from_impulses) if thorough else (_seek_full_burn,)
+    for seek in () if flight is not None else seeks:
         x = blank_extremal()
-        flight = _read(problem, scaled, x, _seek_full_burn(scaled, vehicle, x))
-        if flight is not None and flight.broken != ALTITUDE:
-            return flight
-    x = blank_extremal()
-    return _read(problem, scaled, x, _seek_touching(scaled, vehicle, x)) or flight
+        flight = _read(problem, scaled, x, seek(scaled, vehicle, held, x))
+        if flight is not None:
+            break
+    if flight is not None and flight.broken != ALTITUDE:
+        return flight
+    for seek in (_seek_touching, _seek_from_edge) if thorough else (_seek_touching,):
+        x = blank_extremal()
+        touching = _read(problem, scaled, x, seek(scaled, vehicle, held, x))
+        if touching is not None and touching.broken != ALTITUDE:
+            return touching
+    return flight
 
 
 def fly_to(problem: LandingProblem, x: Extremal, size: int) -> PrimerFlight | None:
@@ -167,15 +184,33 @@ def _seek(problem: PrimerProblem, vehicle: _Vehicle, time: float, x: Extremal) -
 
 
 @compile_kernel
-def _seek_full_burn(problem: PrimerProblem, vehicle: _Vehicle, x: Extremal) -> int:
-    """The same for the flight that burns all the way."""
-    return judge_extremal(x, problem, *vehicle) if solve_full_burn(problem, x) else _NOT_FOUND
+def _seek_full_burn(problem: PrimerProblem, vehicle: _Vehicle, time: float, x: Extremal) -> int:
+    """The same for the flight that burns all the way; of the best time alone."""
+    if math.isnan(time) and solve_full_burn(problem, x):
+        return judge_extremal(x, problem, *vehicle)
+    return _NOT_FOUND
 
 
 @compile_kernel
-def _seek_touching(problem: PrimerProblem, vehicle: _Vehicle, x: Extremal) -> int:
-    """The same for the extremal that touches the ground, of the best time."""
-    return judge_extremal(x, problem, *vehicle) if solve_touching(problem, x) else _NOT_FOUND
+def _seek_from_impulses(problem: PrimerProblem, vehicle: _Vehicle, time: float, x: Extremal) -> int:
+    """The same for an extremal that only problems with more thrust lead to."""
+    if solve_from_impulses(problem, x) and (math.isnan(time) or solve_primer_at(time, problem, x)):
+        return judge_extremal(x, problem, *vehicle)
+    return _NOT_FOUND
+
+
+@compile_kernel
+def _seek_touching(problem: PrimerProblem, vehicle: _Vehicle, time: float, x: Extremal) -> int:
+    """The same for the extremal that touches the ground, which bends its primer upward."""
+    found = solve_touching(problem, x) and (math.isnan(time) or solve_primer_at(time, problem, x))
+    return judge_extremal(x, problem, *vehicle) if found and x.touch[1] > 0.0 else _NOT_FOUND
+
+
+@compile_kernel
+def _seek_from_edge(problem: PrimerProblem, vehicle: _Vehicle, time: float, x: Extremal) -> int:
+    """The same for one that touches the ground and that only lower starts lead to."""
+    found = solve_touching_from_edge(problem, x) and (math.isnan(time) or solve_primer_at(time, problem, x))
+    return judge_extremal(x, problem, *vehicle) if found and x.touch[1] > 0.0 else _NOT_FOUND
 
 
 @compile_kernel

@@ -11,20 +11,33 @@ from typing import TYPE_CHECKING
 from guidance.exports import lazy_exports
 
 if TYPE_CHECKING:
-    from guidance.lower_bound.proof import GAP_TOLERANCE, prove_least_propellant, prove_no_flight
+    from guidance.lower_bound.proof import (
+        GAP_TOLERANCE,
+        bound_outside,
+        certify_bound,
+        prove_least_propellant,
+        prove_no_flight,
+        prove_no_landing,
+    )
 
 _HOMES = {
     "guidance.lower_bound.proof": (
         "GAP_TOLERANCE",
+        "bound_outside",
+        "certify_bound",
         "prove_least_propellant",
         "prove_no_flight",
+        "prove_no_landing",
     ),
 }
 
 __all__ = [
     "GAP_TOLERANCE",
+    "bound_outside",
+    "certify_bound",
     "prove_least_propellant",
     "prove_no_flight",
+    "prove_no_landing",
 ]
 
 __getattr__, __dir__ = lazy_exports(

@@ -137,7 +137,10 @@ def place_before(thrust: RelaxedThrust, time: float, theta: float, case: DualCas
 
 @compile_kernel
 def two_impulse_primer(time: float, case: DualCase) -> Array:
-    """Primer (a, b), shape (6,), of the flight of two impulses: their directions at its ends."""
+    """Primer (a, b), shape (6,), of the flight of two impulses: their directions at its ends.
+
+    A landing point that is free lies where both have the same direction but for up and down.
+    """
     primer = np.empty(6)
     first, last = np.empty(3), np.empty(3)
     for axis in range(3):
@@ -145,9 +148,16 @@ def two_impulse_primer(time: float, case: DualCase) -> Array:
         after = -case.position[axis] / time - 0.5 * fall
         first[axis] = after - case.velocity[axis]
         last[axis] = case.arrival[axis] - after - fall
+    if case.anywhere:
+        share = abs(first[2]) / max(abs(first[2]) + abs(last[2]), 1e-300)
+        for axis in range(2):
+            change = first[axis] + last[axis]
+            first[axis], last[axis] = share * change, (1.0 - share) * change
     first /= max(math.sqrt(dot(first, first)), 1e-300)
     last /= max(math.sqrt(dot(last, last)), 1e-300)
     primer[:3], primer[3:] = last, (first - last) / time
+    if case.anywhere:
+        primer[3:5] = 0.0  # but for rounding it is
     return primer
 
 
@@ -185,11 +195,12 @@ def _curvature(primer: Array, basis: Array, time: float, case: DualCase, slope: 
 
 
 @compile_kernel
-def affine_basis(time: float) -> Array:
-    """The numbers (a, b T) of a primer, shape (6, 6)."""
+def affine_basis(time: float, case: DualCase) -> Array:
+    """The numbers (a, b T) of a primer, shape (6, 6); without those that its landing point leaves no room."""
     out = np.zeros((6, 6))
     for k in range(6):
-        out[k, k] = 1.0 if k < 3 else 1.0 / time
+        if k < 3 or k == 5 or not case.anywhere:
+            out[k, k] = 1.0 if k < 3 else 1.0 / time
     return out
 
 

@@ -40,6 +40,7 @@ class DualCase(NamedTuple):
         sine: of the pointing limit; 0 where there is none.
         slope_cosine: of the glide slope limit; 0 where the altitude is the only limit.
         slope_sine: of the glide slope limit, 1 for the altitude; 0 to leave out both.
+        anywhere: whether the landing point may lie anywhere in the target's plane: b is vertical then.
     """
 
     position: Array
@@ -54,6 +55,7 @@ class DualCase(NamedTuple):
     sine: float
     slope_cosine: float
     slope_sine: float
+    anywhere: bool
 
 
 @compile_kernel
@@ -62,13 +64,16 @@ def chord_growth(most: float, exhaust: float) -> float:
     return math.expm1(most / exhaust) / most if most > 0.0 else 1.0 / exhaust
 
 
-def dual_case(problem: LandingProblem, most: float) -> DualCase:
-    """The relaxation for flights of a landing problem that spend at most `most` [m/s]."""
+def dual_case(problem: LandingProblem, most: float, anywhere: bool = False) -> DualCase:
+    """The relaxation for flights of a landing problem that spend at most `most` [m/s].
+
+    Where they may land anywhere in the target's plane a glide slope counts as the altitude alone.
+    """
     lander, mass = problem.lander, problem.state.mass
     exhaust = lander.exhaust_velocity
     full, least = lander.max_thrust / mass, lander.min_thrust / mass
     limit = math.pi if lander.pointing_limit is None else lander.pointing_limit
-    slope = problem.glide_slope_limit or 0.0
+    slope, slopes = problem.glide_slope_limit or 0.0, problem.has_glide_slope and not anywhere
     return DualCase(
         np.array(problem.offset),
         np.array(problem.state.velocity),
@@ -80,6 +85,7 @@ def dual_case(problem: LandingProblem, most: float) -> DualCase:
         least / exhaust,
         math.cos(limit),
         math.sin(limit) if limit < math.pi else 0.0,
-        math.cos(slope) if problem.has_glide_slope else 0.0,
-        math.sin(slope) if problem.has_glide_slope else 1.0,
+        math.cos(slope) if slopes else 0.0,
+        math.sin(slope) if slopes else 1.0,
+        anywhere,
     )

@@ -71,10 +71,10 @@ def find_breach(primer: Array, time: float, case: DualCase) -> Breach:
 
 
 @compile_kernel
-def _kinked_basis(time: float, normal: Array) -> Array:
+def _kinked_basis(time: float, case: DualCase, normal: Array) -> Array:
     """The numbers (a, b T, multiplier T) of a primer with a limit on the path, shape (9, 7)."""
     out = np.zeros((9, 7))
-    out[:AFFINE, :AFFINE] = affine_basis(time)
+    out[:AFFINE, :AFFINE] = affine_basis(time, case)
     for axis in range(3):
         out[AFFINE + axis, AFFINE] = normal[axis] / time
     return out
@@ -92,7 +92,7 @@ def shift_kink(known: Array, later: float, time: float) -> Array:
 def ascend_with_kink(start: Array, time: float, case: DualCase, tolerance: float, enough: float) -> Ascent:
     """The best primer of a time of flight [s] with the limit on the path that `start` uses; as `ascend`."""
     normal = start[AFFINE:THETA] / math.sqrt(dot(start[AFFINE:THETA], start[AFFINE:THETA]))
-    found = ascend(start, _kinked_basis(time, normal), time, case, tolerance, enough)
+    found = ascend(start, _kinked_basis(time, case, normal), time, case, tolerance, enough)
     if not dot(found.primer[AFFINE:THETA], normal) > _LEAST_MULTIPLIER / time:
         found.primer[AFFINE:THETA], found.primer[THETA] = 0.0, np.inf
     return found
@@ -130,7 +130,7 @@ def keep_path(found: Ascent, time: float, case: DualCase, tolerance: float, enou
             break
         start = best.primer.copy()
         start[AFFINE:THETA], start[THETA] = 0.0, breach.theta
-        other = ascend(start, _kinked_basis(time, breach.normal), time, case, tolerance, enough)
+        other = ascend(start, _kinked_basis(time, case, breach.normal), time, case, tolerance, enough)
         flown = other.primer
         if not dot(flown[AFFINE:THETA], breach.normal) > _LEAST_MULTIPLIER / time:
             break

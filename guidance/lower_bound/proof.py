@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from guidance.arrays import Array
+from guidance.arrays import Array, Index
 from guidance.descent.certificate import Certificate
-from guidance.descent.dual_bound import DualBound, DualPiece
+from guidance.descent.dual_bound import DualBound, DualPiece, OuterBound
 from guidance.descent.problem import LandingProblem
 from guidance.flight_time.extremal import touches
 from guidance.flight_time.primer_vector import PrimerFlight
@@ -25,6 +25,7 @@ from guidance.lower_bound.time_cover import (
     bound_at,
     claimed_bound,
     cover_times,
+    join_cover,
 )
 from guidance.lower_bound.time_grid import time_grid
 
@@ -79,9 +80,65 @@ def prove_no_flight(
     if bound is None:
         return None
     causes = [name for name, without in _relaxed(problem) if _bound_above_tank(without, time) is None]
-    if any(piece.path_multiplier.any() for piece in bound.pieces):
-        causes.append("glide slope" if problem.has_glide_slope else "altitude")
-    return Certificate(f"{_SCOPE}: dual bound on the propellant", (*causes, *_CAUSES), (bound,))
+    found = certify_bound(bound)
+    return replace(found, causes=(*causes, *found.causes))
+
+
+def prove_no_landing(problem: LandingProblem, time: float) -> Certificate | None:
+    """Proof that the tank pays for no landing anywhere in the target's plane; None where none is shown.
+
+    Args:
+        problem: the landing problem.
+        time: [s] a likely time of flight, to begin with.
+    """
+    exhaust = problem.lander.exhaust_velocity
+    most = exhaust * problem.log_mass_ratio
+    target = most + 2.0 * GRANTED * exhaust
+    aim = CoverAim(target, _DECISIVE * exhaust, target)
+    times, cover = _cover(problem, most, time, None, aim, anywhere=True)
+    return certify_bound(_bound_by_cover(problem, most, times, cover)) if cover.level >= target else None
+
+
+def certify_bound(bound: DualBound) -> Certificate:
+    """What a bound above the tank's content says, over all times of flight."""
+    limited = any(piece.path_multiplier.any() for piece in bound.pieces)
+    slope = bound.problem.has_glide_slope and not bound.anywhere
+    path = ("glide slope" if slope else "altitude",) if limited else ()
+    where = "every landing point in the target's plane, " if bound.anywhere else ""
+    return Certificate(f"{where}{_SCOPE}: dual bound on the propellant", (*path, *_CAUSES), (bound,))
+
+
+def bound_outside(
+    problem: LandingProblem, time: float, anywhere: bool = False
+) -> OuterBound | DualBound | None:
+    """Proof that the tank pays for no flight outside a span of times, or for none; None without either.
+
+    Args:
+        problem: the landing problem.
+        time: [s] a likely time of flight, to begin with.
+        anywhere: whether it may land anywhere in the target's plane.
+    """
+    exhaust = problem.lander.exhaust_velocity
+    most = exhaust * problem.log_mass_ratio
+    target = most + 2.0 * GRANTED * exhaust
+    aim = CoverAim(target, GAP_TOLERANCE * exhaust, -math.inf)
+    times, cover = _cover(problem, most, time, None, aim, anywhere)
+    case = dual_case(problem, most, anywhere)
+    envelope, owner = np.full(times.size - 1, -np.inf), np.zeros(times.size - 1, np.int64)
+    for number, primer in enumerate(cover.primers):
+        join_cover(primer, number, times, case, envelope, owner)
+    below = np.flatnonzero(envelope < target)
+    claim = claimed_bound(target, most, exhaust)
+    if below.size == 0:
+        return DualBound(problem, most, claim, _pieces(times, owner, cover.primers))
+    if below[0] == 0 or below[-1] == envelope.size - 1:
+        return None
+    first, last = int(below[0]), int(below[-1]) + 1
+    before, after = _pieces(times, owner, cover.primers, 0, first), _pieces(times, owner, cover.primers, last)
+    return OuterBound(
+        DualBound(problem, most, claim, before, 0.0, float(times[first])),
+        DualBound(problem, most, claim, after, float(times[last]), math.inf),
+    )
 
 
 def certify_cover(
@@ -133,9 +190,14 @@ def _relaxed(problem: LandingProblem) -> list[tuple[str, LandingProblem]]:
 
 
 def _cover(
-    problem: LandingProblem, most: float, time: float, flight: PrimerFlight | None, aim: CoverAim
+    problem: LandingProblem,
+    most: float,
+    time: float,
+    flight: PrimerFlight | None,
+    aim: CoverAim,
+    anywhere: bool = False,
 ) -> tuple[Array, TimeCover]:
-    case = dual_case(problem, most)
+    case = dual_case(problem, most, anywhere)
     times = time_grid(case, aim.target * (1.0 + 1e-12), time, _CELLS)
     start = two_impulse_primer(time, case) if flight is None else kinked_primer_of(flight.extremal, case)
     return times, cover_times(times, case, start, time, aim)
@@ -160,14 +222,24 @@ def _piece(begin: float, end: float, primer: Array) -> DualPiece:
 
 def _bound_by_cover(problem: LandingProblem, most: float, times: Array, cover: TimeCover) -> DualBound:
     """What a cover of a grid of times [s] proves of the flights that spend at most `most` [m/s]."""
-    starts = np.flatnonzero(np.diff(cover.owner, prepend=-1))
-    ends = np.append(times[starts[1:]], times[-1])
+    pieces = _pieces(times, cover.owner, cover.primers)
+    return DualBound(problem, most, _claim(problem, cover.level, most), pieces)
+
+
+def _pieces(
+    times: Array, owner: Index, primers: Array, first: int = 0, last: int | None = None
+) -> tuple[DualPiece, ...]:
+    """The cells from one to another, one piece for neighbours with one primer; None: and all times beyond."""
+    owned = owner[first:last]
+    starts = first + np.flatnonzero(np.diff(owned, prepend=-1))
+    ends = np.append(times[starts[1:]], times[first + owned.size])
     pieces = [
-        _piece(float(times[first]), float(end), cover.primers[cover.owner[first]])
-        for first, end in zip(starts, ends, strict=True)
+        _piece(float(times[start]), float(end), primers[owner[start]])
+        for start, end in zip(starts, ends, strict=True)
     ]
-    pieces.append(_piece(float(times[-1]), math.inf, cover.primers[0]))
-    return DualBound(problem, most, _claim(problem, cover.level, most), tuple(pieces))
+    if last is None:
+        pieces.append(_piece(float(times[-1]), math.inf, primers[0]))
+    return tuple(pieces)
 
 
 def _claim(problem: LandingProblem, level: float, most: float) -> float:

@@ -137,7 +137,7 @@ def best_primer(known: Array, later: float, time: float, case: DualCase, aim: Co
         kinked = _follow_kink(shift_kink(known, later, time), time, case, aim)
         if kinked.value > aim.target - aim.tolerance:
             return kinked
-    gradient, basis = np.empty(6), affine_basis(time)
+    gradient, basis = np.empty(6), affine_basis(time, case)
     impulses = two_impulse_primer(time, case)
     second = _FIRST_SCALE * impulses
     first = known[:AFFINE] + _NUDGE * (second - known[:AFFINE])

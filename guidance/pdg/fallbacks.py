@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING
 
 from guidance.descent.certificate import Certificate
 from guidance.descent.plan import Plan, PlanStatus
+from guidance.flight_time.path_limits import PROPELLANT
 from guidance.flight_time.primer_vector import PrimerFlight
 from guidance.flight_time.time_window import time_window
 from guidance.pdg.request import Request, remaining_time
@@ -35,6 +36,7 @@ MOST_NODES = 1000
 """A plan that does not keep its limits on so many nodes is none."""
 
 _NOT_CURED_BY_NODES = ("thrust_below", "pointing", "final_thrust_direction", "propellant")
+_NOWHERE = "the thrust and the propellant on board suffice for no landing anywhere in the target's plane"
 _OUT_OF_REACH = "the thrust and the propellant on board do not suffice for any flight to the target"
 
 
@@ -123,7 +125,18 @@ def _refuse(request: Request) -> Plan | None:
             "dual bound",
             _OUT_OF_REACH,
         )
+        overdrawn = request.extremal is not None and request.extremal.broken == PROPELLANT
+        if proof is None and overdrawn and not request.provisional:  # by next to nothing
+            proof = _prove_by_cones(request)
     return None if proof is None else Plan(PlanStatus.INFEASIBLE, problem, method, message=words, proof=proof)
+
+
+def _prove_by_cones(request: Request) -> Certificate | None:
+    """Proof that no flight exists, with Farkas proofs where the dual bound leaves times open."""
+    from guidance.planning.convex_planner import prove_infeasible
+
+    proof = prove_infeasible(request.problem, request.nodes, None)
+    return proof if isinstance(proof, Certificate) else None
 
 
 def _plan_convex(request: Request) -> Plan:
@@ -226,14 +239,34 @@ def answer_without_flight(plan: Plan, request: Request, unreachable: str) -> Pla
 
 def _plan_nearest(request: Request) -> Plan:
     """The reachable point nearest to the target: by the indirect method, else by the convex problem."""
-    from guidance.planning.convex_planner import plan_nearest
-
     problem, nodes = request.problem, request.nodes
     if request.method == "auto" and request.time_of_flight is None:
-        plan = plan_nearest_indirect(problem, nodes, request.extremal)
+        plan = _plan_nearest_without_solver(request)
+        if plan is not None:
+            return plan
+    from guidance.planning.convex_planner import plan_nearest
+
+    near = None if request.provisional or request.nearest is None else request.nearest.time
+    return plan_nearest(problem, nodes, request.time_of_flight, request.provisional, near)
+
+
+def _plan_nearest_without_solver(request: Request) -> Plan | None:
+    """The same by the indirect method, or proof that there is no landing anywhere; None without either."""
+    from guidance.planning.infeasibility import prove_by_window, prove_no_landing_anywhere
+
+    problem, window = request.problem, time_window(request.problem, free_landing_point=True)
+    if window.empty:
+        proof, method = prove_by_window(window), "closed form"
+    else:
+        plan = plan_nearest_indirect(problem, request.nodes, request.nearest)
         if plan.status.has_flight and (request.provisional or plan.keeps_limits):
             return plan
-    return plan_nearest(problem, nodes, request.time_of_flight, request.provisional)
+        proof = None if request.provisional else prove_no_landing_anywhere(problem, window)
+        method = "dual bound"
+    if proof is None:
+        return None
+    words = f"{_NOWHERE} (limits: {', '.join(proof.causes)})"
+    return Plan(PlanStatus.INFEASIBLE, problem, method, message=words, proof=proof)
 
 
 def _prove_infeasible(request: Request, anywhere: bool) -> Certificate | ConvexSolution | None:

@@ -9,6 +9,7 @@ import numpy as np
 
 from guidance.descent.plan import Plan
 from guidance.descent.problem import LandingProblem
+from guidance.flight_time.nearest_landing import NearestLanding, find_nearest_landing
 from guidance.flight_time.primer_vector import PrimerFlight, find_extremal_flight
 from guidance.state import State
 
@@ -41,12 +42,19 @@ class Request:
         """What the indirect method finds, whether or not it breaks a limit."""
         if self.landing_error_weight is not None:
             return None
-        return find_extremal_flight(self.problem, self.time_of_flight)
+        return find_extremal_flight(self.problem, self.time_of_flight, not self.provisional)
 
     @property
     def flight(self) -> PrimerFlight | None:
         """The same, where it keeps every limit."""
         return None if self.extremal is None or self.extremal.broken else self.extremal
+
+    @cached_property
+    def nearest(self) -> NearestLanding | None:
+        """What the indirect method finds near a target that is out of reach; None where it is not asked."""
+        if self.method != "auto" or self.time_of_flight is not None or self.extremal is None:
+            return None
+        return find_nearest_landing(self.problem, self.extremal, not self.provisional)
 
     @property
     def bounds_first(self) -> bool:

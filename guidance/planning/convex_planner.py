@@ -15,6 +15,7 @@ from guidance.flight_time.time_window import forbidden_by
 from guidance.planning.convex_task import ConvexTask, relaxation_tight
 from guidance.planning.infeasibility import prove_fixed_time, prove_free_time
 from guidance.planning.minimum_propellant import (
+    COARSE_NODES,
     LOG_MASS_TOLERANCE,
     TimeOutcome,
     minimise_over_time,
@@ -214,13 +215,25 @@ def plan_weighed(
 
 
 def plan_nearest(
-    problem: LandingProblem, nodes: int, time_of_flight: float | None = None, provisional: bool = False
+    problem: LandingProblem,
+    nodes: int,
+    time_of_flight: float | None = None,
+    provisional: bool = False,
+    near: float | None = None,
 ) -> Plan:
     """Land softly as near to the target as possible, in its plane, then with the least propellant.
 
     Three convex problems: the cheapest soft landing anywhere (which tells whether there is one), the least
     landing error with the propellant on board, the least propellant to within that error (Blackmore,
     Acikmese and Scharf, JGCD 33(4), 2010, "prioritized" scheme).
+
+    Args:
+        problem: what to solve.
+        nodes: N.
+        time_of_flight: [s] or None to search for the best.
+        provisional: whether a flight near the best time will do.
+        near: [s] a likely time of flight: where the tank pays for a landing then, the first of the three is
+            left out; None if none is known.
 
     Returns:
         A plan that is NEAREST, or one without a flight (no soft landing anywhere was found).
@@ -234,12 +247,15 @@ def plan_nearest(
         least = nearest.solve(time_of_flight)
         solves = 1
     else:
-        found, solves = _cheapest_anywhere(anywhere)
-        if isinstance(found, Plan):
-            return found
-        outcome = minimise_over_time(nearest, _ERROR_TOLERANCE, found.time)
+        begin, solves = near, 1
+        if begin is None or not replace(nearest, nodes=COARSE_NODES).solve(begin).solved:
+            found, solves = _cheapest_anywhere(anywhere)
+            if isinstance(found, Plan):
+                return found
+            begin = found.time
+        outcome = minimise_over_time(nearest, _ERROR_TOLERANCE, begin)
         solves += outcome.solves
-        least = outcome.solution or nearest.solve(found.time)
+        least = outcome.solution or nearest.solve(begin)
     if not least.solved:
         message = f"no soft landing anywhere in the target's plane ({least.answer.words})"
         return Plan(PlanStatus.INFEASIBLE, problem, METHOD, message=message, solves=solves)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from guidance.descent.certificate import Certificate
 from guidance.descent.plan import Plan, PlanStatus
 from guidance.descent.problem import LandingProblem
-from guidance.flight_time.nearest_landing import find_nearest_landing
+from guidance.flight_time.nearest_landing import NearestLanding
 from guidance.flight_time.primer_trajectory import lay_nodes
 from guidance.flight_time.primer_vector import PrimerFlight
 
@@ -41,19 +41,18 @@ def plan_indirect(
     return Plan.of_flight(PlanStatus.OPTIMAL, problem, METHOD, laid, proof=proof)
 
 
-def plan_nearest_indirect(problem: LandingProblem, nodes: int, overdrawn: PrimerFlight | None) -> Plan:
+def plan_nearest_indirect(problem: LandingProblem, nodes: int, nearest: NearestLanding | None) -> Plan:
     """Plan to the point nearest to the target that the tank pays for.
 
     Args:
         problem: what cannot be reached.
         nodes: as of `plan_indirect`.
-        overdrawn: the extremal to the target itself, which burns more than there is; None if none is known.
+        nearest: what `find_nearest_landing` found; None if it was not asked.
 
     Returns:
         A plan that is NEAREST; or LIMIT_REACHED where the method finds none.
     """
-    nearest = None if overdrawn is None else find_nearest_landing(problem, overdrawn)
-    if nearest is None:
+    if nearest is None or nearest.flight is None:
         return Plan(PlanStatus.LIMIT_REACHED, problem, METHOD, message=NOT_FOUND)
     laid = lay_nodes(nearest.problem, nearest.flight, nodes)
     return Plan.of_flight(PlanStatus.NEAREST, problem, METHOD, laid)

@@ -11,10 +11,11 @@ from guidance.convex.farkas import FarkasProof
 from guidance.convex.programme import ConvexSolution, convex_template
 from guidance.convex.scaling import scale_problem
 from guidance.descent.certificate import Certificate
+from guidance.descent.dual_bound import DualBound
 from guidance.descent.problem import LandingProblem
 from guidance.flight_time.primer_vector import PrimerFlight
 from guidance.flight_time.time_window import TimeWindow, forbidden_by, guess_time, time_window
-from guidance.lower_bound.proof import prove_no_flight
+from guidance.lower_bound.proof import bound_outside, certify_bound, prove_no_flight, prove_no_landing
 from guidance.planning.convex_task import ConvexTask
 
 
@@ -84,8 +85,20 @@ def prove_by_dual_bound(
     return prove_no_flight(problem, guess_time(problem, window) if flight is None else flight.time, flight)
 
 
+def prove_no_landing_anywhere(problem: LandingProblem, window: TimeWindow) -> Certificate | None:
+    """Proof that the tank pays for no landing in the target's plane; None where the bound shows none.
+
+    Args:
+        problem: the landing problem.
+        window: times of flight that closed-form bounds admit for such a landing; not empty.
+    """
+    return None if problem.rotates else prove_no_landing(problem, guess_time(problem, window))
+
+
 def prove_free_time(task: ConvexTask) -> Certificate | ConvexSolution | None:
-    """Certificate for a free time of flight: closed-form bounds outside a window, and Farkas proofs inside.
+    """Certificate for a free time of flight: Farkas proofs at the times that no other bound forbids.
+
+    Dual bounds forbid all times but a span; where they show none, closed-form bounds forbid all but a window.
 
     Args:
         task: what was to be solved.
@@ -99,8 +112,17 @@ def prove_free_time(task: ConvexTask) -> Certificate | ConvexSolution | None:
         return prove_by_window(window)
     if task.problem.rotates:  # no closed form bounds the time of flight
         return None
-    proofs = []
-    for time in window.grid():
+    outer = bound_outside(task.problem, guess_time(task.problem, window), task.free_landing_point)
+    times, beyond = window.grid(), "closed-form bounds"
+    if isinstance(outer, DualBound):
+        return certify_bound(outer)
+    if outer is not None:
+        low, high = outer.before.longest, outer.after.shortest
+        within = times[(low < times) & (times < high)]
+        times = within if within.size > 0 else np.array([0.5 * (low + high)])
+        beyond = f"dual bounds, up to {low:.4g} and from {high:.4g} s"
+    proofs: list[FarkasProof] = []
+    for time in times:
         proof = prove_at(task, float(time))
         if isinstance(proof, FarkasProof):
             proofs.append(proof)
@@ -110,7 +132,7 @@ def prove_free_time(task: ConvexTask) -> Certificate | ConvexSolution | None:
         return None
     causes = tuple(dict.fromkeys(cause for proof in proofs for cause in proof.causes))
     scope = (
-        f"{len(proofs)} times of flight from {window.low:.3g} to {window.high:.3g} s, {task.nodes} nodes, "
-        "thrust bounds relaxed outward: verified Farkas proofs; all times outside: closed-form bounds"
+        f"{len(proofs)} times of flight from {min(times):.4g} to {max(times):.4g} s, {task.nodes} nodes, "
+        f"thrust bounds relaxed outward: verified Farkas proofs; all times outside: {beyond}"
     )
-    return Certificate(scope, causes, tuple(proofs))
+    return Certificate(scope, causes, (*proofs, *(() if outer is None else (outer,))))

@@ -16,7 +16,8 @@ from guidance.flight_time.time_window import TimeWindow, guess_time, time_window
 from guidance.planning.bracket_search import BracketSearch
 from guidance.planning.convex_task import MOST_REFINEMENTS, ConvexTask, bounds_hold
 
-_COARSE_NODES = 13
+COARSE_NODES = 13
+"""Of the mesh on which a search begins."""
 _NEAR_DEAD_TIME = 0.97  # first steps are small where the guess is good
 _STEPS_FROM_EDGE = (1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3)  # changes of a time that the true bounds refuse
 LOG_MASS_TOLERANCE = 4e-6
@@ -104,8 +105,8 @@ def minimise_over_time(
     start = min(max(start, window.low), window.high)
     solves = 0
     chosen = _Search.of(task)
-    if coarse_first and task.nodes > 1.5 * _COARSE_NODES:
-        coarse = replace(task, nodes=_COARSE_NODES, tolerance=1e-6)
+    if coarse_first and task.nodes > 1.5 * COARSE_NODES:
+        coarse = replace(task, nodes=COARSE_NODES, tolerance=1e-6)
         search = chosen.kind(coarse.solve, window, chosen.coarse_tolerance * tolerance, model)
         found = search.run(start)
         solves = len(search.samples)

@@ -14,8 +14,8 @@ from guidance.arrays import Array
 from guidance.dynamics import propagate_into
 from guidance.kernel import compile_kernel
 from hda.flight.ground_contact import Motion, fall_to_ground, hold_over_ground
-from hda.navigation.steering import NO_SENSING, Sensing
-from hda.safety.touchdown_stance import NO_GROUND, Footing
+from hda.navigation.steering import Sensing
+from hda.safety.touchdown_stance import Footing
 
 FLYING, TOUCHDOWN, TANK_EMPTY = 0, 1, 2
 """Where a period leaves the vehicle: `hda.flight.vehicle.FlightStatus` as plain numbers."""
@@ -50,8 +50,8 @@ class FlightConditions(NamedTuple):
         thrust_error: relative error of the applied thrust.
         navigation_error: estimated minus true position [m] and velocity [m/s], shape (6,); a filter changes
             it in place from period to period.
-        footing: the lander over the true ground; without ground the flight ends on the plane.
-        sensing: the filter at work, if there is one.
+        footing: the lander over the true ground; None: the flight ends on the plane.
+        sensing: the filter at work, if there is one. What is None compiles to nothing.
     """
 
     period: float
@@ -60,8 +60,8 @@ class FlightConditions(NamedTuple):
     vehicle: VehicleLimits
     thrust_error: float
     navigation_error: Array
-    footing: Footing = NO_GROUND
-    sensing: Sensing = NO_SENSING
+    footing: Footing | None = None
+    sensing: Sensing | None = None
 
 
 @compile_kernel
@@ -100,14 +100,18 @@ def _hold(
     thrust: Array,
     duration: float,
     conditions: FlightConditions,
+    footing: Footing | None,
     out: Array,
 ) -> tuple[float, bool]:
-    """Hold a thrust for `duration`, or until the plane or the ground is met: (time flown, whether it was)."""
+    """Hold a thrust for `duration`, or until the plane or the ground is met: (time flown, whether it was).
+
+    The footing is an argument of its own: numba leaves out what follows from None in an argument only.
+    """
     gravity, plane = conditions.gravity, conditions.plane
     exhaust_velocity = conditions.vehicle.exhaust_velocity
-    if conditions.footing.elevation.size > 0:
+    if footing is not None:
         motion = Motion(start, thrust, gravity, exhaust_velocity)
-        return hold_over_ground(motion, duration, conditions.footing, out)
+        return hold_over_ground(motion, duration, footing, out)
     propagate_into(start, thrust, duration, gravity, exhaust_velocity, out)
     high = duration
     below = out[2] <= plane
@@ -145,11 +149,16 @@ def fall_to_plane(
 
 
 @compile_kernel
+def _fall(start: Array, gravity: Array, plane: float, footing: Footing | None, out: Array) -> float:
+    if footing is not None:
+        return fall_to_ground(start, gravity, footing, out)
+    return fall_to_plane(start, gravity, plane, out)
+
+
+@compile_kernel
 def fall_freely(start: Array, conditions: FlightConditions, out: Array) -> float:
     """Fall freely to the plane, or to the true ground where there is one; return the time it took."""
-    if conditions.footing.elevation.size > 0:
-        return fall_to_ground(start, conditions.gravity, conditions.footing, out)
-    return fall_to_plane(start, conditions.gravity, conditions.plane, out)
+    return _fall(start, conditions.gravity, conditions.plane, conditions.footing, out)
 
 
 @compile_kernel
@@ -166,7 +175,7 @@ def hold_period(
     dry = flow * conditions.period >= start[6] - vehicle.dry_mass and flow > 0.0
     if dry:
         burn = (start[6] - vehicle.dry_mass) / flow
-    flown, crossed = _hold(start, applied, burn, conditions, out)
+    flown, crossed = _hold(start, applied, burn, conditions, conditions.footing, out)
     if crossed:
         return flown, TOUCHDOWN
     if dry:

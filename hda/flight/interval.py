@@ -58,7 +58,14 @@ _PlainFooting = tuple[NDArray[np.float32], Array, float, float, float]
 """`Footing` without names."""
 
 _PlainConditions = tuple[
-    float, float, Array, tuple[float, float, float, float, float], float, Array, _PlainFooting, PlainSensing
+    float,
+    float,
+    Array,
+    tuple[float, float, float, float, float],
+    float,
+    Array,
+    _PlainFooting | None,
+    PlainSensing | None,
 ]
 """`FlightConditions` without names."""
 
@@ -175,6 +182,18 @@ def _estimate_error(
     return along * mean_mass / square - 1.0
 
 
+def plain_footing(footing: Footing) -> _PlainFooting:
+    """Take the names away."""
+    return footing.elevation, footing.pads, footing.pad_radius, footing.clearance, footing.plane
+
+
+@compile_kernel
+def _name_footing(plain: _PlainFooting | None) -> Footing | None:
+    if plain is None:
+        return None
+    return Footing(*plain)
+
+
 @compile_kernel
 def _name_conditions(conditions: _PlainConditions) -> FlightConditions:
     period, plane, gravity, vehicle, thrust_error, navigation, footing, sensing = conditions
@@ -185,7 +204,7 @@ def _name_conditions(conditions: _PlainConditions) -> FlightConditions:
         VehicleLimits(*vehicle),
         thrust_error,
         navigation,
-        Footing(*footing),
+        _name_footing(footing),
         name_sensing(sensing),
     )
 

@@ -89,11 +89,11 @@ def judge_touchdown(
         site: [m] shape (3,), where the lander was flying to, by the true map.
         under_power: whether the engine still burnt.
     """
-    touchdown, stance = scenario.preset.touchdown, scenario.preset.stance
-    if not isinstance(touchdown, GroundTouchdown) or stance is None:
+    touchdown, stance, footing = scenario.preset.touchdown, scenario.preset.stance, scenario.footing
+    if not isinstance(touchdown, GroundTouchdown) or stance is None or footing is None:
         return None
     x, y = (float(value) for value in final.position[:2])
-    pose = stand(scenario.footing, x, y)
+    pose = stand(footing, x, y)
     sinking = pose.normals @ final.velocity
     sliding = np.linalg.norm(final.velocity - sinking[:, None] * pose.normals, axis=1)
     body = TippingBody(

@@ -19,10 +19,10 @@ from guidance.lander import Lander
 from guidance.state import State
 from guidance.thrust_limits import pointing_angle
 from hda.flight import held_thrust
-from hda.flight.interval import enter_plan, enter_zem_zev
-from hda.navigation.steering import NO_SENSING, Sensing, plain_sensing
+from hda.flight.interval import enter_plan, enter_zem_zev, plain_footing
+from hda.navigation.steering import Sensing, plain_sensing
 from hda.policy import Decision, ZemZevCommand
-from hda.safety.touchdown_stance import NO_GROUND, Footing
+from hda.safety.touchdown_stance import Footing
 
 
 @dataclass(frozen=True)
@@ -54,11 +54,11 @@ class Surroundings:
 
     Attributes:
         gravity: [m/s^2] shape (3,), pointing down.
-        footing: the lander over the true ground; without ground the flight ends on the plane of the site.
+        footing: the lander over the true ground; None: the flight ends on the plane of the site.
     """
 
     gravity: Array
-    footing: Footing = NO_GROUND
+    footing: Footing | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,12 +70,12 @@ class FlightErrors:
         navigation: estimated minus true position [m] and velocity [m/s], shape (6,); the vehicle steers by
             the estimate.
         sensing: a filter that goes on estimating during the interval, from the given error on; its memory is
-            changed. By default there is none: the error stays.
+            changed. None: the error stays.
     """
 
     thrust: float = 0.0
     navigation: Array = field(default_factory=lambda: np.zeros(6))
-    sensing: Sensing = NO_SENSING
+    sensing: Sensing | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,8 +134,9 @@ def fly_over(
     time, path, commanded = np.empty(periods + 2), np.empty((periods + 2, 7)), np.empty((periods + 1, 3))
     plane, vehicle = float(decision.site[2]), _vehicle_limits(lander)
     gravity, ground = surroundings.gravity, surroundings.footing
-    footing = (ground.elevation, ground.pads, ground.pad_radius, ground.clearance, ground.plane)
-    believed, sensing = errors.navigation.copy(), plain_sensing(errors.sensing)
+    footing = None if ground is None else plain_footing(ground)
+    sensing = None if errors.sensing is None else plain_sensing(errors.sensing)
+    believed = errors.navigation.copy()
     conditions = (interval.period, plane, gravity, vehicle, errors.thrust, believed, footing, sensing)
     start, log, command = state.as_array(), (time, path, commanded), decision.command
     if isinstance(command, ZemZevCommand):

@@ -11,13 +11,8 @@ from guidance.arrays import Array, Index
 from guidance.kernel import compile_kernel
 from hda.navigation.control_period import navigate_period, range_down
 from hda.navigation.layout import (
-    ESTIMATED,
-    NORMAL_COLUMNS,
     POSITION,
-    SENSORS,
     SITE,
-    SIZE,
-    UNIFORM_COLUMNS,
     VELOCITY,
     AidingNumbers,
     FilterMemory,
@@ -33,7 +28,7 @@ class Sensing(NamedTuple):
     Attributes:
         memory: changed in place.
         errors: the sensors' true errors; the accelerometer's bias is changed in place.
-        normal: shape (n, 16), draws of the interval's control periods. Empty: there is no filter.
+        normal: shape (n, 16), draws of the interval's control periods.
         uniform: shape (n, 3).
         numbers: sensors and filter.
         elevation: [m] shape (rows, columns), the true ground at 1 m a cell.
@@ -80,8 +75,10 @@ PlainSensing = tuple[
 
 
 @compile_kernel
-def name_sensing(plain: PlainSensing) -> Sensing:
+def name_sensing(plain: PlainSensing | None) -> Sensing | None:
     """Give a plain tuple its names."""
+    if plain is None:
+        return None
     memory, errors, normal, uniform, numbers, elevation, top, site, instant = plain
     inertial, altimeter, velocimeter, terrain, beams, relief, length, gates, patience = numbers
     named = FilterNumbers(
@@ -100,39 +97,16 @@ def name_sensing(plain: PlainSensing) -> Sensing:
     )
 
 
-def _without_names(sensing: Sensing) -> PlainSensing:
+def plain_sensing(sensing: Sensing) -> PlainSensing:
+    """Take the names away."""
     numbers = sensing.numbers
     plain = tuple(tuple(part) if isinstance(part, tuple) else part for part in numbers)
     return (tuple(sensing.memory), tuple(sensing.errors), *sensing[2:4], plain, *sensing[5:])  # pyright: ignore[reportReturnType]
 
 
-def _no_sensing() -> Sensing:
-    nothing = np.empty((0, 0), dtype=np.float32)
-    nothing.flags.writeable = False
-    off = AidingNumbers(1.0, 0, 0.0, 0.0, 1.0, 0.0, 0.0)
-    numbers = FilterNumbers(
-        InertialNumbers(0.0, 0.0, 1.0), off, off, off, np.zeros((3, 3)), 0.0, 1.0, np.zeros(SENSORS), 1
-    )
-    memory = FilterMemory(np.zeros(ESTIMATED), np.zeros((SIZE, SIZE)), np.zeros(SENSORS, dtype=np.int64))
-    errors = TrueErrors(np.zeros(3), 0.0, np.zeros(3), np.zeros(3))
-    normal, uniform = np.empty((0, NORMAL_COLUMNS)), np.empty((0, UNIFORM_COLUMNS))
-    return Sensing(memory, errors, normal, uniform, numbers, nothing, 0.0, np.zeros(3), 0)
-
-
-NO_SENSING = _no_sensing()
-"""No filter: the error of the estimate stays as it is."""
-
-_PLAIN_NO_SENSING = _without_names(NO_SENSING)
-
-
-def plain_sensing(sensing: Sensing) -> PlainSensing:
-    """Take the names away."""
-    return _PLAIN_NO_SENSING if sensing is NO_SENSING else _without_names(sensing)
-
-
 @compile_kernel
 def sense(
-    sensing: Sensing, flown: tuple[Array, Array, float, int], gravity: Array, estimation_error: Array
+    sensing: Sensing | None, flown: tuple[Array, Array, float, int], gravity: Array, estimation_error: Array
 ) -> None:
     """Take the filter over one flown control period, if there is a filter.
 
@@ -140,15 +114,16 @@ def sense(
     the site stands where the policy put it.
 
     Args:
-        sensing: the filter; changed in place.
+        sensing: the filter; changed in place. None: the error of the estimate stays as it is, and numba
+            compiles nothing of the filter.
         flown: true states (x y z vx vy vz m) before and after, the time between [s], and the number of the
             period in its interval.
         gravity: [m/s^2] shape (3,).
         estimation_error: shape (6,), estimated minus true position [m] and velocity [m/s]; written in place.
     """
-    before, after, time, period = flown
-    if sensing.normal.shape[0] == 0:
+    if sensing is None:
         return
+    before, after, time, period = flown
     height = range_down(sensing.elevation, after[:3], sensing.errors.tilt, sensing.top)
     truth = (before, after, time, height, sensing.instant + period + 1)
     draws = (sensing.normal[period], sensing.uniform[period])

@@ -73,7 +73,7 @@ class Footing(NamedTuple):
     """A lander over its ground, for the kernels.
 
     Attributes:
-        elevation: [m] shape (rows, columns), 1 m a cell; NaN where unknown. Empty: there is only the plane.
+        elevation: [m] shape (rows, columns), 1 m a cell; NaN where unknown.
         pads: [m] shape (4, 2).
         pad_radius: [m].
         clearance: [m].
@@ -90,16 +90,6 @@ class Footing(NamedTuple):
 def make_footing(elevation: NDArray[np.float32], stance: Stance, plane: float) -> Footing:
     """Set a lander over a map of heights, read-only as a tile's is."""
     return Footing(elevation, stance.pads, stance.pad_radius, stance.clearance, plane)
-
-
-def _no_ground() -> Footing:
-    nothing = np.empty((0, 0), dtype=np.float32)
-    nothing.flags.writeable = False
-    return Footing(nothing, np.zeros((4, 2)), 0.0, 0.0, 0.0)
-
-
-NO_GROUND = _no_ground()
-"""No ground but the target plane."""
 
 
 @compile_kernel
@@ -169,9 +159,9 @@ def contact_height(footing: Footing, x: float, y: float) -> float:
     return highest if highest > -np.inf else plane
 
 
-def set_down(footing: Footing, site: Array) -> Array:
+def set_down(footing: Footing | None, site: Array) -> Array:
     """[m] shape (3,), a site at the height where the lander touches true ground; itself without ground."""
-    if footing.elevation.size == 0:
+    if footing is None:
         return site
     return np.array([site[0], site[1], contact_height(footing, float(site[0]), float(site[1]))])
 

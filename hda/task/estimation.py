@@ -16,7 +16,7 @@ from guidance.state import State
 from hda.navigation.layout import TrueErrors
 from hda.navigation.navigation_state import NavigationState, begin_navigation
 from hda.navigation.site_tracking import choose_site, find_site, track_site
-from hda.navigation.steering import NO_SENSING, Sensing
+from hda.navigation.steering import Sensing
 from hda.task.scenario import Scenario, ground_point
 
 _ABOVE = 1.0  # [m] over the target plane, which is the highest ground: beyond all rounding
@@ -66,8 +66,8 @@ def look_aim(scenario: Scenario, target: Array, error: Array) -> Array:
 
 def open_sensing(
     scenario: Scenario, navigation: NavigationState | None, target: Array, site: Array, look: int
-) -> Sensing:
-    """The filter made ready for the interval after a look; `NO_SENSING` without one.
+) -> Sensing | None:
+    """The filter made ready for the interval after a look; None without one.
 
     Args:
         scenario: the episode.
@@ -78,7 +78,7 @@ def open_sensing(
     """
     system, rules = scenario.preset.navigation, scenario.preset.rules
     if system is None or navigation is None:
-        return NO_SENSING
+        return None
     moved = choose_site(navigation, site - target)
     draws = scenario.streams.readings(look, rules.control_periods)
     errors = moved.errors
@@ -98,7 +98,7 @@ def open_sensing(
 def next_estimate(
     scenario: Scenario,
     navigation: NavigationState | None,
-    sensing: Sensing,
+    sensing: Sensing | None,
     state: State,
     site: Array,
     look: int,
@@ -114,7 +114,7 @@ def next_estimate(
         look: number of the next look.
     """
     system = scenario.preset.navigation
-    if system is None or navigation is None:
+    if system is None or navigation is None or sensing is None:
         return None
     errors = replace(navigation.errors, accelerometer_bias=sensing.errors.accelerometer_bias)
     instant = navigation.instant + scenario.preset.rules.control_periods

@@ -14,7 +14,7 @@ from guidance.state import State
 from hda.ground.library import FRESH_SPLIT, Ground, load_tile, tile_numbers
 from hda.ground.tile import Tile
 from hda.navigation.sensor_errors import SensorErrors, draw_sensor_errors
-from hda.safety.touchdown_stance import NO_GROUND, Footing, make_footing
+from hda.safety.touchdown_stance import Footing, make_footing
 from hda.task.first_target import describe_lack, draw_target, offers_targets
 from hda.task.observation import ScenarioView
 from hda.task.presets import Preset, find_preset
@@ -69,22 +69,27 @@ class Scenario:
     @property
     def view(self) -> ScenarioView:
         """What a policy may know of it."""
-        return ScenarioView(
-            lander=self.preset.lander,
-            gravity=np.array(self.preset.gravity),
-            nominal_target=self.nominal_target.copy(),
-            rules=self.preset.rules,
-            lidar=self.preset.lidar,
-            criteria=self.preset.criteria,
-        )
+        return view_of_preset(self.preset, self.nominal_target)
 
     @property
-    def footing(self) -> Footing:
-        """The lander over the true ground; without ground where flights end on the plane."""
+    def footing(self) -> Footing | None:
+        """The lander over the true ground; None where flights end on the plane."""
         stance = self.preset.stance
         if stance is None:
-            return NO_GROUND
+            return None
         return make_footing(self.tile.elevation, stance, float(self.nominal_target[2]))
+
+
+def view_of_preset(preset: Preset, nominal_target: Array) -> ScenarioView:
+    """What a policy may know of an episode on a preset, with its first target [m], shape (3,)."""
+    return ScenarioView(
+        lander=preset.lander,
+        gravity=np.array(preset.gravity),
+        nominal_target=nominal_target.copy(),
+        rules=preset.rules,
+        lidar=preset.lidar,
+        criteria=preset.criteria,
+    )
 
 
 def ground_point(scenario: Scenario, site: Array) -> Array:

@@ -16,17 +16,17 @@ from rich.console import Console
 from rich.table import Table
 
 from guidance.kernel import kernel_folder
-from hda.registry import policy_entry
 from studies.campaign.executor import OpenExecutor
 from studies.campaign.monte_carlo import Chunk, Study, fly_chunk, prepare_study
 from studies.campaign.points import describe_left_out, describe_retry, find_missing, fly_missing
+from studies.campaign.policy_parts import compile_parts, list_parts, quick_policies
 from studies.campaign.score import MEASURE_COLUMNS, RATIO_COLUMNS, RunningScore
 from studies.campaign.study_folder import StudyFolder
 from studies.columns import document_cell
 from studies.compare.display import Phase, show_phase
 from studies.statistics.ratios import wilson_interval
 
-COMPILING_SECONDS = 40.0
+COMPILING_SECONDS = 25.0
 """[s] about what compiling takes, once for a version of the code; for the display alone."""
 LOADING_SECONDS = 5.0
 """[s] about what loading compiled code takes."""
@@ -56,9 +56,13 @@ def fly_comparison(folder: StudyFolder, open_executor: OpenExecutor, here: bool,
         return
     seconds = None
     if here:
-        prepare_study(study, workers)
-        if len(missing) > _FEW_CHUNKS or not is_compiled(study):
-            seconds = rehearse(study, console)
+        ready = is_compiled(study)
+        if ready:
+            prepare_study(study, workers)
+        if len(missing) > _FEW_CHUNKS or not ready:
+            seconds = rehearse(study, console, workers)
+        if not ready:
+            prepare_study(study, workers)  # the rehearsal has compiled its kernels too, in one process
     lacking = sum(last - first for first, last in missing)
     kept = study.episodes - lacking
     at_once = min(workers, os.cpu_count() or 1)
@@ -84,10 +88,16 @@ def fly_comparison(folder: StudyFolder, open_executor: OpenExecutor, here: bool,
         fly_missing(folder, missing, open_executor, workers, tell)
 
 
-def rehearse(study: Study, console: Console) -> float:
+def rehearse(study: Study, console: Console, workers: int = 1) -> float:
     """Fly the first episode twice with each policy in this process, so that all code is compiled.
 
-    Slow policies are left out. Workers then load what was compiled here, each kernel once.
+    Slow policies are left out. Where nothing is compiled yet and there are several workers, they compile the
+    parts of the policies before. Workers of the flights then load what was compiled here, each kernel once.
+
+    Args:
+        study: what is going to be flown.
+        console: where it is shown.
+        workers: processes.
 
     Returns:
         [s] about what an episode of all policies takes, compiled.
@@ -95,12 +105,16 @@ def rehearse(study: Study, console: Console) -> float:
     Raises:
         PolicyError: a policy raised something.
     """
-    ready = is_compiled(study)
+    ready, names = is_compiled(study), quick_policies(study)
+    at_once = min(workers, os.cpu_count() or 1)
+    parts = [] if ready or at_once == 1 else list_parts(study)
     title = "loading compiled code" if ready else "compiling, once for this version of the code"
     expected = LOADING_SECONDS if ready else COMPILING_SECONDS
     seconds = 0.0
-    names = [name for name in study.policies if not policy_entry(name).slow]
-    with show_phase(console, Phase(title, len(names), expected, steady=False)) as display:
+    phase = Phase(title, len(parts) + len(names), expected, steady=False)
+    with show_phase(console, phase) as display:
+        if parts:
+            compile_parts(study, parts, at_once, partial(display.advance, 1))
         for name in names:
             alone = replace(study, policies=(name,))
             fly_chunk(alone, 0, 1)
@@ -116,7 +130,7 @@ def rehearse(study: Study, console: Console) -> float:
 
 def is_compiled(study: Study) -> bool:
     """Whether each policy has flown at these sources on this machine: what is left is to load its code."""
-    return {name for name in study.policies if not policy_entry(name).slow} <= _read_flown()
+    return set(quick_policies(study)) <= _read_flown()
 
 
 def _flown_before() -> Path:

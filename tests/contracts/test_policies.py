@@ -224,6 +224,7 @@ def test_on_real_ground_it_flies_to_the_ground_that_was_measured(name, scenarios
     for scenario in (scenarios[1], scenarios[3], scenarios[4]):
         record = fly(hda.make_policy(name), scenario)
         site = ground_point(scenario, record.decisions[-1].site)
+        assert scenario.footing is not None
         contact = contact_height(scenario.footing, float(site[0]), float(site[1]))
         assert abs(site[2] - contact) < 2.0
         assert record.outcome.report is not None

@@ -11,7 +11,7 @@ from guidance.two_impulse import divert_cost
 from hda.ground.tile import Tile
 from hda.policies.hazard_aware import load_kernels
 from hda.policies.privileged.oracle import ON_MAP, frame_offset, put_on_map, safe_clearance
-from hda.safety.touchdown_stance import NO_GROUND, Footing, set_down
+from hda.safety.touchdown_stance import Footing, set_down
 from hda.sensing.ranging import RangingLidar
 from hda.site_selection import Site
 from hda.task.observation import Observation, ScenarioView
@@ -66,13 +66,13 @@ class CheapestSafeSite:
     Attributes:
         truth: the tile that is being flown.
         clearance: [m] of safe ground around the site.
-        footing: the lander over the true ground, for the height of the site; none on the target plane.
+        footing: the lander over the true ground, for the height of the site; None on the target plane.
         offset: [m] shape (3,), of the frame that sites are given in from the map.
     """
 
     truth: Tile = field(repr=False)
     clearance: float = 2.0
-    footing: Footing = field(default=NO_GROUND, repr=False)
+    footing: Footing | None = field(default=None, repr=False)
     offset: Array = field(default_factory=lambda: ON_MAP, repr=False)
 
     @classmethod

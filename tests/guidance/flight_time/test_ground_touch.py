@@ -174,3 +174,34 @@ def test_any_harsh_flight_of_the_indirect_method_is_flown_within_its_limits(seed
     assert plan.residuals.position < 5e-3
     assert plan.residuals.altitude < 5e-3
     assert plan.residuals.landing_velocity < 1e-3
+
+
+@pytest.mark.parametrize("start", TOUCHING)
+@pytest.mark.parametrize("share", [0.97, 1.04, 1.15])
+def test_a_touch_is_known_at_a_given_time_of_flight_too(start, share):
+    best = guidance.solve_pdg(start, TARGET)
+    time = share * best.time_of_flight
+    plan = guidance.solve_pdg(start, TARGET, time_of_flight=time)
+    convex = guidance.solve_pdg(start, TARGET, time_of_flight=time, method="convex", nodes=201)
+    assert plan.method == "indirect"
+    assert plan.time_of_flight == time
+    assert touches(flight_of(plan).extremal)
+    assert plan.keeps_limits
+    assert plan.residuals.altitude < 5e-3
+    assert best.propellant < plan.propellant == pytest.approx(convex.propellant, abs=0.05)
+    assert plan.certificate is not None
+    assert plan.certificate.verified
+    assert plan.certificate.lower_bound <= plan.propellant
+
+
+def test_a_touch_at_a_given_time_has_a_slope_of_the_cost_that_vanishes_at_the_best_time():
+    """Propellant over the time of flight is least where the free search ends, and smooth there."""
+    best = guidance.solve_pdg(TOUCHING[1], TARGET)
+    steps = np.array([-0.02, -0.01, 0.0, 0.01, 0.02])
+    burnt = [
+        guidance.solve_pdg(TOUCHING[1], TARGET, time_of_flight=(1.0 + step) * best.time_of_flight).propellant
+        for step in steps
+    ]
+    slope, bend = np.polyfit(steps, burnt, 2)[1::-1]
+    assert bend > 0.0
+    assert abs(slope) < 0.05 * bend * 0.02

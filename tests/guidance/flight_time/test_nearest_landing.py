@@ -32,7 +32,7 @@ def nearest_landings(seed, count):
         (problem, find_nearest_landing(problem, flight))
         for problem, flight in overdrawn_problems(seed, count)
     ]
-    return [(problem, nearest) for problem, nearest in found if nearest is not None]
+    return [(problem, nearest) for problem, nearest in found if nearest.flight is not None]
 
 
 def test_it_lands_within_the_tank_and_the_primer_points_at_the_target():
@@ -112,6 +112,6 @@ def test_in_a_plane_it_stays_in_the_plane():
 
 def test_it_is_sought_only_where_the_tank_is_what_lacks():
     problem, flight = next(overdrawn_problems(75, 100))
-    assert find_nearest_landing(problem, replace(flight, broken=KEPT)) is None
+    assert find_nearest_landing(problem, replace(flight, broken=KEPT)).flight is None
     sight = Limits(line_of_sight=Cone(1.5))
-    assert find_nearest_landing(replace(problem, limits=sight), flight) is None
+    assert find_nearest_landing(replace(problem, limits=sight), flight).flight is None

@@ -46,7 +46,7 @@ def test_not_even_the_best_primer_of_the_flights_time(seed):
     rng = np.random.default_rng(seed)
     flight = random_flight(rng)
     case = dual_case(flight.problem, flight.spent)
-    start, basis = 1.1 * two_impulse_primer(flight.time, case), affine_basis(flight.time)
+    start, basis = 1.1 * two_impulse_primer(flight.time, case), affine_basis(flight.time, case)
     best = ascend(start, basis, flight.time, case, 1e-4, 10.0 * flight.spent)
     assert bound_at(best.primer, flight.time, case, 300) <= flight.spent * (1.0 + 1e-6)
 
@@ -107,6 +107,6 @@ def test_where_the_dual_function_has_no_maximum_the_ascent_stops_a_little_above_
     start = [200.0, 100.0, 950.0, -8.0, -4.0, -30.0, 1200.0]
     case = dual_case(LandingProblem(State.parse(start), TARGET, PAPER_LANDER, GRAVITY), 130.0)
     for enough in (1000.0, 4000.0):  # the primer it starts with bounds less
-        found = ascend(two_impulse_primer(time, case), affine_basis(time), time, case, 1e-4, enough)
+        found = ascend(two_impulse_primer(time, case), affine_basis(time, case), time, case, 1e-4, enough)
         assert enough < found.value < 1.5 * enough
         assert not found.stalled

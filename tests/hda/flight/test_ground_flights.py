@@ -45,6 +45,7 @@ class OntoThePlane:
 
 
 def true_contact(scenario: Scenario, place: np.ndarray) -> float:
+    assert scenario.footing is not None
     return contact_height(scenario.footing, float(place[0]), float(place[1]))
 
 

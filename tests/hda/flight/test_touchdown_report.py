@@ -50,6 +50,7 @@ def touch(
     site: tuple[float, float] | None = None,
     under_power: bool = False,
 ) -> TouchdownReport:
+    assert scenario.footing is not None
     height = contact_height(scenario.footing, *place)
     final = State(np.array([*place, height]), np.array(velocity), 1160.0)
     aim = np.array([*(site or place), height])

@@ -6,7 +6,6 @@ from dataclasses import replace
 import pytest
 
 import hda
-from hda.safety.touchdown_stance import NO_GROUND
 from hda.task.presets import PRESETS
 
 
@@ -15,8 +14,9 @@ def test_only_the_presets_that_measure_their_ground_end_on_it():
         on_ground = name in ("lidar", "lidar-coarse", "navigated")
         assert isinstance(preset.touchdown, hda.GroundTouchdown) == on_ground
         assert (preset.stance is not None) == on_ground
-    assert hda.sample_scenario("paper", 0, 0).footing is NO_GROUND
+    assert hda.sample_scenario("paper", 0, 0).footing is None
     scenario = hda.sample_scenario("lidar", 0, 0)
+    assert scenario.footing is not None
     assert scenario.footing.elevation is scenario.tile.elevation
     assert scenario.footing.plane == scenario.nominal_target[2]
 

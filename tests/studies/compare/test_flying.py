@@ -99,5 +99,21 @@ def test_the_first_run_on_a_machine_says_that_it_compiles(tmp_path: Path) -> Non
         env={**os.environ, "LUNAR_HDA_CACHE": str(tmp_path / "cache")},
     )
     assert done.returncode == 0, done.stderr
-    assert done.stdout.startswith("compiling, once for this version of the code (about 40 s)\n")
+    assert done.stdout.startswith("compiling, once for this version of the code (about 25 s)\n")
     assert "\x1b" not in done.stdout
+    compiled = {path.name for path in (tmp_path / "cache" / "kernels").rglob("*.nbc")}
+    assert any("enter_zem_zev" in name for name in compiled)
+    assert not any("range_down" in name or "find_contact" in name for name in compiled)  # paper needs neither
+
+
+@pytest.mark.slow
+def test_a_policy_that_fails_in_a_process_is_named_by_its_flight(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(registry, "REGISTRY", registry.REGISTRY.copy())
+    monkeypatch.setattr("studies.compare.flying.kernel_folder", lambda: tmp_path)
+    monkeypatch.setattr("os.cpu_count", lambda: 2)
+    policy_entry(RAISES)
+    study = Study(PRESETS["paper"], ("no-divert", "raising"), 50, paths=(RAISES,))
+    with pytest.raises(PolicyError, match=r"policy 'raising' failed in episode 0 .* no idea"):
+        rehearse(study, Console(), workers=2)
