@@ -71,10 +71,20 @@ class PlanCommand:
     Attributes:
         reference: states at the control instants from this decision on.
         gains: (K_r [1/s^2], K_v [1/s]) of the feedback about it.
+        assumed_error: relative error of the thrust that the feedback reckons with until it has felt the
+            engine for a control period.
+
+    Raises:
+        ValueError: the assumed error is -1 or less: no engine answers, or above 1.
     """
 
     reference: TrackingReference
     gains: tuple[float, float]
+    assumed_error: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Refuse an engine that no command moves."""
+        finite_number("assumed_error", self.assumed_error, above=-1.0, at_most=1.0)
 
 
 Command = ZemZevCommand | PlanCommand

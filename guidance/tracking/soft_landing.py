@@ -167,11 +167,8 @@ def plan_soft_landing(
     Raises:
         ValueError: an argument is out of range, such as a start below the gate.
     """
-    engine = _with_margins(lander, options)
-    duration = options.terminal_periods * control_period
-    speed = options.terminal_deceleration * duration
-    gate = finite_vector("site", site, 3) + np.array([0.0, 0.0, 0.5 * speed * duration])
-    approach = _Approach(state, gate, engine, finite_vector("gravity", gravity, 3), options)
+    approach, speed = _approach_gate(state, site, lander, control_period, options, gravity)
+    gate = approach.gate
     if periods is not None:
         plan = approach.cheapest(periods - options.terminal_periods, speed, control_period)
         if plan is None:
@@ -192,6 +189,55 @@ def plan_soft_landing(
         if plan is not None and plan.landing_error <= search.landing_error + _LANDING_ERROR_SLACK:
             return SoftLanding(search.status, sample_descent(plan, sinking, control_period, options), plan)
     return SoftLanding(PlanStatus.LIMIT_REACHED, None, search)
+
+
+def plan_timed_landing(
+    state: State,
+    site: Array,
+    lander: Lander,
+    timing: tuple[float, int],
+    options: SoftLandingOptions = DEFAULT_OPTIONS,
+    gravity: ArrayLike = MOON_GRAVITY,
+) -> SoftLanding:
+    """Plan a gentle touchdown at `site` after a given time, be it longer than the best.
+
+    Args:
+        state: start of the plan.
+        site: [m] shape (3,).
+        lander: as in `plan_soft_landing`.
+        timing: [s] control period, and how many of them the whole flight takes.
+        options: how the plan is made.
+        gravity: [m/s^2] shape (3,), along -z.
+
+    Returns:
+        The landing; LIMIT_REACHED where no flight of this time reaches the site.
+
+    Raises:
+        ValueError: an argument is out of range.
+    """
+    control_period, periods = timing
+    approach, speed = _approach_gate(state, site, lander, control_period, options, gravity)
+    before_gate = (periods - options.terminal_periods) * control_period
+    plan = approach.solve(before_gate, speed, nearest=False) if before_gate > 0.0 else None
+    if plan is None or plan.status is not PlanStatus.OPTIMAL:
+        return SoftLanding(PlanStatus.LIMIT_REACHED, None, None)
+    return SoftLanding(PlanStatus.OPTIMAL, sample_descent(plan, speed, control_period, options), plan)
+
+
+def _approach_gate(
+    state: State,
+    site: Array,
+    lander: Lander,
+    control_period: float,
+    options: SoftLandingOptions,
+    gravity: ArrayLike,
+) -> tuple[_Approach, float]:
+    """The question how to come to the gate above a site, and the speed [m/s] at which it is passed."""
+    engine = _with_margins(lander, options)
+    duration = options.terminal_periods * control_period
+    speed = options.terminal_deceleration * duration
+    gate = finite_vector("site", site, 3) + np.array([0.0, 0.0, 0.5 * speed * duration])
+    return _Approach(state, gate, engine, finite_vector("gravity", gravity, 3), options), speed
 
 
 def _with_margins(lander: Lander, options: SoftLandingOptions) -> Lander:

@@ -115,21 +115,22 @@ def _fly_zem_zev(
 def _fly_plan(
     start: Array,
     reference: _Reference,
-    gains: TrackingGains,
+    feedback: tuple[TrackingGains, float],
     conditions: FlightConditions,
     log: _Log,
 ) -> tuple[int, int, int]:
     """Track a reference for one interval; returns as `_fly_zem_zev`.
 
-    The engine's error ratio is unknown at the start of the interval; once a period has been flown it is known
-    from the change of velocity, which is compared with what the command should have given.
+    The engine's error ratio is unknown at the start of the interval, and assumed (second of `feedback`); once
+    a period has been flown it is known from the change of velocity, which is compared with what the command
+    should have given.
     """
     time, path, commanded = log
     period, gravity, vehicle = conditions.period, conditions.gravity, conditions.vehicle
     navigation = conditions.navigation_error
     periods = commanded.shape[0] - 1
     planned = reference.acceleration.shape[0]
-    estimate = 0.0
+    gains, estimate = feedback
     limited = 0
     for number in range(7):
         path[0, number] = start[number]
@@ -225,10 +226,12 @@ def enter_zem_zev(
 def enter_plan(
     start: Array,
     reference: tuple[Array, Array, Array],
-    gains: tuple[float, float],
+    feedback: tuple[float, float, float],
     conditions: _PlainConditions,
     log: tuple[Array, Array, Array],
 ) -> tuple[int, int, int]:
     """`_fly_plan` of plain tuples."""
     named = _name_conditions(conditions)
-    return _fly_plan(start, _Reference(*reference), TrackingGains(*gains), named, _Log(*log))
+    position_gain, velocity_gain, assumed_error = feedback
+    gains = TrackingGains(position_gain, velocity_gain)
+    return _fly_plan(start, _Reference(*reference), (gains, assumed_error), named, _Log(*log))

@@ -149,8 +149,8 @@ def fly_over(
         _check_period(reference.control_period, interval.period)
         parts = (reference.position, reference.velocity, reference.thrust_acceleration)
         position_gain, velocity_gain = command.gains
-        gains = (position_gain, velocity_gain)
-        nodes, status, limited = enter_plan(start, parts, gains, conditions, log)
+        feedback = position_gain, velocity_gain, command.assumed_error
+        nodes, status, limited = enter_plan(start, parts, feedback, conditions, log)
         time_to_go = reference.duration - float(time[nodes - 1])
     return Segment(
         time=time[:nodes],

@@ -8,7 +8,6 @@ import numpy as np
 
 from guidance.arrays import Array
 from guidance.tracking.reference import TrackingReference
-from guidance.tracking.regulator import tracking_gains
 from guidance.tracking.retarget import shift_landing_point, velocity_change, within_pointing, within_thrust
 from hda.policies.planned_descent import DescentMemory, PlannedDescent, raise_plan
 from hda.policy import Command, DecisionStatus, PlanCommand
@@ -51,7 +50,7 @@ class AdjustedDescent:
             fresh = self.planned.command(observation, site, memory)
             if not possible or _is_cheaper(fresh[:2], shifted):
                 return fresh
-        command = PlanCommand(shifted, tracking_gains(view.control_period, self.planned.weights))
+        command = self.planned.command_of(shifted, view, observation.state.mass)
         return (
             command,
             DecisionStatus.NOMINAL,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from guidance.tracking.soft_landing import SoftLandingOptions
-from hda.policies.adjusted_descent import AdjustedDescent
 from hda.policies.composition import ComposedPolicy, PrivilegedComposition
 from hda.policies.deferred_decision import DeferredDecisionPolicy
 from hda.policies.entry import PolicyEntry
@@ -12,6 +11,7 @@ from hda.policies.planned_descent import PlannedDescent
 from hda.policies.privileged.hindsight import BestKnownSite
 from hda.policies.privileged.oracle import OracleSite
 from hda.policies.privileged.oracle_fuel import CheapestSafeSite
+from hda.policies.waiting_descent import WaitingDescent
 from hda.policies.zem_zev import FixedGainZemZev
 from hda.site_selection import NearestSafeSite, NominalSite, SingleDivertSite
 
@@ -63,7 +63,7 @@ ENTRIES: tuple[PolicyEntry, ...] = (
     ),
     PolicyEntry(
         "hazard-aware",
-        lambda: ComposedPolicy("hazard-aware", HazardAwareSite(), AdjustedDescent()),
+        lambda: ComposedPolicy("hazard-aware", HazardAwareSite(), WaitingDescent()),
         "least propellant and risk by the belief from all looks, flown by convex guidance",
     ),
     PolicyEntry(

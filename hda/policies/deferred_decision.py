@@ -17,7 +17,6 @@ from guidance.arrays import Array
 from guidance.descent.plan import PlanStatus
 from guidance.planning.deferred_decision import DeferredDecision, TrunkOptions, plan_deferred
 from guidance.tracking.reference import TrackingReference
-from guidance.tracking.regulator import tracking_gains
 from guidance.tracking.soft_landing import SoftLanding, plan_soft_landing, sample_descent
 from guidance.validation import finite_number
 from hda.policies.adjusted_descent import AdjustedDescent
@@ -27,7 +26,7 @@ from hda.policies.hazard_aware import HazardAwareSite, fuse_look
 from hda.policies.landing_dispersion import landing_probability
 from hda.policies.planned_descent import DescentMemory
 from hda.policies.site_price import HazardAwareWeights
-from hda.policy import Decision, DecisionStatus, PlanCommand
+from hda.policy import Decision, DecisionStatus
 from hda.task.observation import Observation, ScenarioView
 
 _NEVER = 1e9  # [s] no later look counts in the ranking
@@ -161,7 +160,7 @@ class DeferredDecisionPolicy:
         trunk = None if memory.committed else self._defer(observation, candidates, memory)
         if trunk is None:
             return self._fly_to(candidates.sites[0], observation, replace(memory, committed=True))
-        return self._track(trunk, candidates.sites[0], memory)
+        return self._track(trunk, candidates.sites[0], memory, observation.state.mass)
 
     def _ranking(self) -> HazardAwareSite:
         """The objective of `hazard_aware` without the looks to come: deferral stands in for them."""
@@ -237,7 +236,7 @@ class DeferredDecisionPolicy:
 
     def _soft_landing(self, observation: Observation, site: Array, view: ScenarioView) -> SoftLanding | None:
         """Plan to the first candidate; None where that is out of the planner's range."""
-        options, state = self.descent.planned.options, observation.state
+        options, state = self.descent.planned.options_for(view), observation.state
         duration = options.terminal_periods * view.control_period
         if state.mass <= view.lander.dry_mass:
             return None
@@ -246,10 +245,10 @@ class DeferredDecisionPolicy:
         return plan_soft_landing(state, site, view.lander, view.control_period, options, view.gravity)
 
     def _track(
-        self, trunk: _Trunk, site: Array, memory: DeferredDecisionMemory
+        self, trunk: _Trunk, site: Array, memory: DeferredDecisionMemory, mass: float
     ) -> tuple[Decision, DeferredDecisionMemory]:
         view, reference = memory.view, trunk.reference
-        command = PlanCommand(reference, tracking_gains(view.control_period, self.descent.planned.weights))
+        command = self.descent.planned.command_of(reference, view, mass)
         descent = replace(memory.descent, site=site.copy(), reference=reference.after(view.control_periods))
         left = trunk.parting_time - view.decision_interval
         memory = replace(memory, descent=descent, parting_time=left)

@@ -7,7 +7,7 @@ unless another gains.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 import numpy as np
@@ -34,6 +34,7 @@ from hda.sensing.ranging import RangingLidar
 from hda.task.observation import Observation, ScenarioView
 from hda.task.rules import Rules
 
+_WIDEST_SPREAD = 1.0  # [m] 2.5 of it are the half width over which the price averages
 _SQUARE = 1.25  # half side of the belief's square in widths of the first look
 
 
@@ -62,6 +63,23 @@ def fuse_look(observation: Observation, view: ScenarioView, belief: GroundBelief
     if not isinstance(belief, SafetyBelief):
         belief = SafetyBelief.blank(observation.target, half_side)
     return belief.fused(observation, lidar)
+
+
+def landing_spread(observation: Observation, control: float) -> float:
+    """[m] standard deviation of the touchdown about the site along each horizontal axis.
+
+    Args:
+        observation: its covariance is the filter's, of position less site: of the relative error, as a look
+            is placed by the lander's own estimate and moves with its absolute one. None without a filter.
+        control: [m] the part of guidance and control.
+
+    Returns:
+        The root of the sum of both squares, at most 1 m with a filter: the price reads five cells.
+    """
+    if observation.covariance is None:
+        return control
+    east, north = float(observation.covariance[0, 0]), float(observation.covariance[1, 1])
+    return max(control, min(math.sqrt(control**2 + 0.5 * (east + north)), _WIDEST_SPREAD))
 
 
 @dataclass(frozen=True)
@@ -97,7 +115,8 @@ class HazardAwareSite:
         """The same where the probability that each cell is safe, shape (n, n), is known."""
         next_look = predict_next_look(observation, view, belief.corner, self.weights.commit_time)
         propellant = propellant_map(observation, view, belief)
-        return price_sites(safe, propellant, next_look, self.weights, within)
+        spread = landing_spread(observation, self.weights.dispersion)
+        return price_sites(safe, propellant, next_look, replace(self.weights, dispersion=spread), within)
 
     def select(self, observation: Observation, memory: HazardAwareMemory) -> tuple[Array, HazardAwareMemory]:
         """Fuse the look, price every cell, and move if another gains enough."""

@@ -11,6 +11,7 @@ from guidance.arrays import Array
 from guidance.descent.plan import PlanStatus
 from guidance.lander import Lander
 from guidance.state import State
+from guidance.tracking.engine_error import assumed_error, bearing_margin
 from guidance.tracking.reference import TrackingReference
 from guidance.tracking.regulator import DEFAULT_WEIGHTS, TrackingWeights, tracking_gains
 from guidance.tracking.retarget import shift_landing_point
@@ -46,15 +47,19 @@ class PlannedDescent:
         options: how plans are made.
         weights: feedback about them.
         commit_time: [s] with less time left than this, and the same site, the last plan flies on as it is.
+        bears_engine: the thrust margin is at least the bound of the engine's error
+            (`guidance.tracking.engine_error`), and an engine that the margin does not cover by far is taken
+            for a weak one until it is felt; else the options' margin stays as it is.
     """
 
     options: SoftLandingOptions = DEFAULT_OPTIONS
     weights: TrackingWeights = DEFAULT_WEIGHTS
     commit_time: float = 10.0
+    bears_engine: bool = True
 
     def begin(self, view: ScenarioView) -> DescentMemory:
         """No plan yet; the planner is made ready here, so that the first decision does not wait for it."""
-        _load_planner(self.options, self.weights, view.control_period)
+        _load_planner(self.options_for(view), self.weights, view.control_period)
         return DescentMemory(view)
 
     def command(
@@ -65,16 +70,18 @@ class PlannedDescent:
         remaining = memory.reference
         same_site = memory.site is not None and np.array_equal(site, memory.site)
         if same_site and remaining is not None and remaining.duration <= self.commit_time:
-            return self._track(remaining, DecisionStatus.NOMINAL, memory)
+            return self._track(observation, remaining, DecisionStatus.NOMINAL, memory)
         landing = self._plan(observation, site, memory, remaining if same_site else None)
         if same_site and remaining is not None and (landing is None or landing.reference is None):
-            return self._track(remaining, DecisionStatus.NOMINAL, memory)  # the plan in flight is still good
+            return self._track(
+                observation, remaining, DecisionStatus.NOMINAL, memory
+            )  # the plan in flight is still good
         if landing is not None and landing.reference is not None:
             nearest = landing.status is PlanStatus.NEAREST
             status = DecisionStatus.FALLBACK_NEAREST if nearest else DecisionStatus.NOMINAL
-            return self._track(landing.reference, status, replace(memory, site=site.copy()))
+            return self._track(observation, landing.reference, status, replace(memory, site=site.copy()))
         if remaining is not None:
-            return self._track(remaining, DecisionStatus.FALLBACK_LAST_PLAN, memory)
+            return self._track(observation, remaining, DecisionStatus.FALLBACK_LAST_PLAN, memory)
         command, _, _ = FixedGainZemZev().command(observation, site, memory.view)
         return command, DecisionStatus.FALLBACK_ZEM_ZEV, replace(memory, site=None, reference=None)
 
@@ -93,15 +100,36 @@ class PlannedDescent:
         if state.position[2] - site[2] <= 0.5 * self.options.terminal_deceleration * duration**2:
             return None
         periods = None if remaining is None else remaining.thrust_acceleration.shape[0]
+        options = self.options_for(view)
         return plan_soft_landing(
-            state, site, view.lander, view.control_period, self.options, view.gravity, periods
+            state, site, view.lander, view.control_period, options, view.gravity, periods
         )
 
+    def options_for(self, view: ScenarioView) -> SoftLandingOptions:
+        """How plans are made for this lander: with a margin that bears its engine."""
+        if not self.bears_engine:
+            return self.options
+        margin = bearing_margin(view.rules.thrust_error, self.options.thrust_margin)
+        return replace(self.options, thrust_margin=margin)
+
+    def command_of(self, reference: TrackingReference, view: ScenarioView, mass: float) -> PlanCommand:
+        """The command that tracks a reference from now on, with a vehicle of `mass` [kg]."""
+        gains = tracking_gains(view.control_period, self.weights)
+        if not self.bears_engine:
+            return PlanCommand(reference, gains)
+        greatest, margin = view.lander.max_thrust / mass, self.options_for(view).thrust_margin
+        assumed = assumed_error(reference, greatest, view.rules.thrust_error, margin, view.control_periods)
+        return PlanCommand(reference, gains, assumed)
+
     def _track(
-        self, reference: TrackingReference, status: DecisionStatus, memory: DescentMemory
+        self,
+        observation: Observation,
+        reference: TrackingReference,
+        status: DecisionStatus,
+        memory: DescentMemory,
     ) -> tuple[PlanCommand, DecisionStatus, DescentMemory]:
         view = memory.view
-        command = PlanCommand(reference, tracking_gains(view.control_period, self.weights))
+        command = self.command_of(reference, view, observation.state.mass)
         return command, status, replace(memory, reference=reference.after(view.control_periods))
 
 

@@ -49,7 +49,8 @@ def change_law(sites: str, option: str, value: str) -> ComposedPolicy:
     if option not in OPTIONS:
         raise ValueError(unknown_name("option", option, OPTIONS))
     number = OPTIONS[option](value)
-    law = PlannedDescent(replace(DEFAULT_OPTIONS, **{option: number}))
+    constant = option == "thrust_margin"
+    law = PlannedDescent(replace(DEFAULT_OPTIONS, **{option: number}), bears_engine=not constant)
     return ComposedPolicy(law_name(sites, option, number), SITES[sites](), law)
 
 

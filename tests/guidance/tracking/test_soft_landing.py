@@ -9,7 +9,7 @@ from guidance.descent.plan import PlanStatus
 from guidance.dynamics import propagate
 from guidance.lander import PAPER_LANDER
 from guidance.state import State
-from guidance.tracking.soft_landing import SoftLandingOptions, plan_soft_landing
+from guidance.tracking.soft_landing import SoftLandingOptions, plan_soft_landing, plan_timed_landing
 from guidance.zem_zev import saturate_thrust
 
 PERIOD = 0.5
@@ -144,3 +144,28 @@ def test_a_speed_limit_is_kept_and_eased_where_the_vehicle_is_faster_already(spe
     free = plan_soft_landing(state, SITE, PAPER_LANDER, PERIOD).reference
     assert free is not None
     assert np.linalg.norm(free.velocity, axis=1).max() > limit + 5.0
+
+
+@pytest.mark.parametrize("later", [0, 10, 30])
+def test_a_timed_landing_takes_the_time_asked_and_costs_no_less(later: int) -> None:
+    state = starts(1)[0]
+    best = plan_soft_landing(state, SITE, PAPER_LANDER, PERIOD)
+    assert best.reference is not None
+    assert best.plan is not None
+    periods = len(best.reference.thrust_acceleration) + later
+    landing = plan_timed_landing(state, SITE, PAPER_LANDER, (PERIOD, periods))
+    assert landing.status is PlanStatus.OPTIMAL
+    assert landing.reference is not None
+    assert landing.plan is not None
+    assert len(landing.reference.thrust_acceleration) == periods
+    np.testing.assert_allclose(landing.reference.position[-1], SITE, atol=1e-3)
+    np.testing.assert_allclose(landing.reference.velocity[-1], 0.0, atol=1e-3)
+    assert landing.plan.propellant >= best.plan.propellant - 1e-3
+    assert landing.plan.propellant > best.plan.propellant + 0.1 or later == 0
+
+
+@pytest.mark.parametrize("periods", [3, 12])
+def test_a_landing_sooner_than_the_engine_allows_is_none(periods: int) -> None:
+    landing = plan_timed_landing(starts(1)[0], SITE, PAPER_LANDER, (PERIOD, periods))
+    assert landing.status is PlanStatus.LIMIT_REACHED
+    assert landing.reference is None

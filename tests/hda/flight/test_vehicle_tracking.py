@@ -27,9 +27,11 @@ def integrate(y: np.ndarray, thrust: np.ndarray, duration: float) -> np.ndarray:
     return solve_ivp(rate, (0.0, duration), y, "DOP853", rtol=1e-12, atol=1e-10).y[:, -1]
 
 
-def fly_by_hand(y: np.ndarray, reference: TrackingReference, error: float, periods: int) -> np.ndarray:
+def fly_by_hand(
+    y: np.ndarray, reference: TrackingReference, error: float, periods: int, assumed: float
+) -> np.ndarray:
     """States at the control instants: feedforward, feedback, and the error known after the first burn."""
-    path, known = [y], 0.0
+    path, known = [y], assumed
     for k in range(min(periods, len(reference.thrust_acceleration))):
         wanted = (
             reference.thrust_acceleration[k]
@@ -54,8 +56,8 @@ def flight() -> tuple[State, TrackingReference]:
     return state, reference
 
 
-def fly(state: State, reference: TrackingReference, error: float, periods: int = 10):
-    decision = Decision(SITE, PlanCommand(reference, GAINS))
+def fly(state: State, reference: TrackingReference, error: float, periods: int = 10, assumed: float = 0.0):
+    decision = Decision(SITE, PlanCommand(reference, GAINS, assumed))
     return fly_over(
         state,
         decision,
@@ -68,13 +70,14 @@ def fly(state: State, reference: TrackingReference, error: float, periods: int =
 
 @pytest.mark.parametrize("error", [0.0, 0.04, -0.05])
 @pytest.mark.parametrize("skipped", [0, 20, 30])
-def test_an_interval_equals_the_flight_by_hand(flight, error: float, skipped: int) -> None:
+@pytest.mark.parametrize("assumed", [0.0, -0.3])
+def test_an_interval_equals_the_flight_by_hand(flight, error: float, skipped: int, assumed: float) -> None:
     _, reference = flight
     left = reference.after(skipped)
     assert left is not None
     start = State(left.position[0] + 0.3, left.velocity[0] - 0.2, 1190.0)
-    segment = fly(start, left, error)
-    by_hand = fly_by_hand(start.as_array(), left, error, 10)
+    segment = fly(start, left, error, assumed=assumed)
+    by_hand = fly_by_hand(start.as_array(), left, error, 10, assumed)
     assert segment.status is FlightStatus.FLYING
     # the vehicle learns its engine's error from one period's change of velocity at the mean mass
     np.testing.assert_allclose(segment.path[:, :6], by_hand[:, :6], atol=2e-3)

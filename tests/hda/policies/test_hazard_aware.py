@@ -16,7 +16,7 @@ from guidance import State
 from guidance.two_impulse import divert_cost
 from hda.flight.episode import begin_flight, fly, observe
 from hda.policies.beliefs.belief import SafetyBelief
-from hda.policies.hazard_aware import HazardAwareMemory, HazardAwareSite
+from hda.policies.hazard_aware import HazardAwareMemory, HazardAwareSite, fuse_look, landing_spread
 from hda.policies.landing_dispersion import landing_probability
 from hda.policies.site_price import (
     HazardAwareWeights,
@@ -252,3 +252,30 @@ def test_the_first_decision_waits_for_no_compiled_code(preset: str) -> None:
     begun, late, modules = answer.stdout.split(maxsplit=2)
     assert int(begun) > 0
     assert (int(late), modules.strip()) == (0, "[]")
+
+
+def test_the_scatter_of_a_landing_is_what_control_and_filter_leave() -> None:
+    scenario = sample_scenario("paper", 0, 0, "tuning")
+    look = observe(scenario, begin_flight(scenario))
+    assert landing_spread(look, 0.3) == 0.3
+    stated = np.diag([0.16, 0.16, 9.0, 9.0, 9.0, 9.0])
+    assert landing_spread(replace(look, covariance=stated), 0.3) == pytest.approx(0.5)
+    assert landing_spread(replace(look, covariance=100.0 * stated), 0.3) == 1.0
+
+
+def test_a_filter_that_knows_less_keeps_further_from_hazards() -> None:
+    scenario = sample_scenario("paper", 0, 0, "tuning")
+    look = observe(scenario, begin_flight(scenario))
+    belief = fuse_look(look, scenario.view, None)
+    safe = np.zeros((belief.side, belief.side), dtype=np.float32)
+    middle = belief.side // 2
+    safe[middle - 1 : middle + 2, middle - 1 : middle + 2] = 1.0  # three cells wide
+    sharp, vague = (
+        HazardAwareSite().price_by(
+            safe, replace(look, covariance=sigma**2 * np.eye(6)), scenario.view, belief
+        )
+        for sigma in (0.0, 0.8)
+    )
+    plain = HazardAwareSite().price_by(safe, look, scenario.view, belief)
+    np.testing.assert_array_equal(sharp, plain)
+    assert vague[middle, middle] > sharp[middle, middle] + 1.0

@@ -6,13 +6,15 @@ import numpy as np
 import pytest
 
 from guidance.state import State
+from guidance.tracking.reference import TrackingReference
 from guidance.zem_zev import time_to_go
 from hda.flight.episode import begin_flight, fly, observe
+from hda.flight.vehicle import ControlPeriods, FlightErrors, FlightStatus, Segment, Surroundings, fly_over
 from hda.policies.composition import ComposedPolicy
 from hda.policies.planned_descent import DescentMemory, PlannedDescent
 from hda.policies.privileged.oracle import OracleSite
 from hda.policies.zem_zev import FixedGainZemZev
-from hda.policy import DecisionStatus, PlanCommand, ZemZevCommand
+from hda.policy import Decision, DecisionStatus, PlanCommand, ZemZevCommand
 from hda.task.observation import Observation
 from hda.task.presets import find_preset
 from hda.task.scenario import Scenario, sample_scenario
@@ -54,6 +56,49 @@ def test_an_engine_error_within_the_margin_does_not_become_a_hard_landing(bound:
         outcome = fly(to_true_site(scenario, PlannedDescent()), scenario).outcome
         assert outcome.success, f"episode {episode} at error {bound}: {outcome}"
         assert outcome.touchdown_speed < 1.0
+
+
+def fly_by_engine(law: PlannedDescent, scenario: Scenario, errors: tuple[float, ...]) -> Segment:
+    """The last segment of a flight to the first target in which the engine errs as told, over and over."""
+    view, site = scenario.view, scenario.nominal_target
+    look, memory, segment = observe(scenario, begin_flight(scenario)), law.begin(view), None
+    surroundings, periods = (
+        Surroundings(view.gravity),
+        ControlPeriods(view.control_period, view.control_periods),
+    )
+    for index in range(12):
+        command, _, memory = law.command(look, site, memory)
+        decision, error = Decision(site, command), FlightErrors(errors[index % len(errors)])
+        segment = fly_over(look.state, decision, view.lander, surroundings, periods, error)
+        if segment.status is not FlightStatus.FLYING:
+            break
+        look = replace(look, state=segment.final_state, time_to_go=segment.time_to_go)
+    assert segment is not None
+    assert segment.status is FlightStatus.TOUCHDOWN
+    return segment
+
+
+@pytest.mark.parametrize("bound", [0.15, 0.3])
+@pytest.mark.parametrize("signs", [(-1.0,), (1.0,), (1.0, -1.0), (-1.0, 1.0)])
+def test_it_bears_an_engine_at_either_end_of_its_bound(bound: float, signs: tuple[float, ...]) -> None:
+    for episode in range(3):
+        scenario = scenario_of(episode, bound)
+        segment = fly_by_engine(PlannedDescent(), scenario, tuple(bound * sign for sign in signs))
+        assert np.linalg.norm(segment.final_state.velocity) < 1.5, f"episode {episode}"
+        assert np.linalg.norm(segment.final_state.position - scenario.nominal_target) < 0.5
+
+
+def test_a_constant_margin_of_a_tenth_does_not() -> None:
+    scenario = scenario_of(0, 0.3)
+    segment = fly_by_engine(PlannedDescent(bears_engine=False), scenario, (-0.3,))
+    assert np.linalg.norm(segment.final_state.velocity) > 5.0
+
+
+@pytest.mark.parametrize("error", [-1.0, 1.5, float("nan")])
+def test_an_engine_that_no_command_moves_is_not_assumed(error: float) -> None:
+    reference = TrackingReference(0.5, np.zeros((2, 3)), np.zeros((2, 3)), np.zeros((1, 3)))
+    with pytest.raises(ValueError, match="assumed_error"):
+        PlanCommand(reference, (0.9, 1.7), error)
 
 
 def test_a_far_site_late_in_the_flight_is_labelled_nearest() -> None:
