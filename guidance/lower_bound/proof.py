@@ -15,7 +15,7 @@ from guidance.flight_time.extremal import touches
 from guidance.flight_time.primer_vector import PrimerFlight
 from guidance.lower_bound.dual_ascent import two_impulse_primer
 from guidance.lower_bound.dual_case import dual_case
-from guidance.lower_bound.dual_function import AFFINE, THETA
+from guidance.lower_bound.dual_function import AFFINE, THETA, linear_part
 from guidance.lower_bound.neighbour_cover import NEIGHBOUR_TOLERANCE, bound_by_neighbours, kinked_primer_of
 from guidance.lower_bound.time_cover import (
     GRANTED,
@@ -128,7 +128,10 @@ def bound_outside(
     for number, primer in enumerate(cover.primers):
         join_cover(primer, number, times, case, envelope, owner)
     below = np.flatnonzero(envelope < target)
+    beyond = linear_part(cover.primers[0], float(times[-1]), case)
     claim = claimed_bound(target, most, exhaust)
+    if beyond < target:  # too little gravity: nothing forbids the times beyond the grid
+        return None
     if below.size == 0:
         return DualBound(problem, most, claim, _pieces(times, owner, cover.primers))
     if below[0] == 0 or below[-1] == envelope.size - 1:

@@ -120,6 +120,15 @@ def test_cones_are_asked_only_at_times_that_the_bound_leaves_open():
     assert found >= 5
 
 
+@pytest.mark.parametrize("time", [0.01, 0.1])
+def test_without_gravity_nothing_is_claimed_beyond_the_last_time_of_the_grid(time):
+    """From rest the longest flights burn next to nothing, though each time of the grid may be too short."""
+    lander = replace(PAPER_LANDER, dry_mass=1199.9, min_thrust=0.0)
+    start = State.parse([0.0, 0.0, 500.0, 0.0, 0.0, 0.0, 1200.0])
+    problem = LandingProblem(start, np.zeros(3), lander, np.zeros(3))
+    assert bound_outside(problem, time) is None
+
+
 @pytest.mark.parametrize("seed", [3, 4])
 def test_no_landing_anywhere_is_said_and_proved(seed):
     said = 0
