@@ -157,9 +157,7 @@ def certify_cover(
         infeasible: whether the bound lies above what the tank holds: there is no flight then.
     """
     bound = _bound_by_cover(problem, most, times, cover)
-    if infeasible:
-        return Certificate(f"{_SCOPE}: dual bound on the propellant", _CAUSES, (bound,))
-    return Certificate(_SCOPE, (), (bound,), bound.propellant)
+    return certify_bound(bound) if infeasible else Certificate(_SCOPE, (), (bound,), bound.propellant)
 
 
 def _bound_above_tank(
