@@ -9,7 +9,8 @@ import numpy as np
 
 from guidance.arrays import Array, Index
 from guidance.descent.certificate import Certificate
-from guidance.descent.dual_bound import DualBound, DualPiece, OuterBound
+from guidance.descent.dual_bound import DualBound, DualPiece
+from guidance.descent.outer_bound import OuterBound
 from guidance.descent.problem import LandingProblem
 from guidance.flight_time.extremal import touches
 from guidance.flight_time.primer_vector import PrimerFlight
