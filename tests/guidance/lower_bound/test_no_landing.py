@@ -100,6 +100,7 @@ def test_a_tank_that_lacks_a_gram_is_refused_and_one_that_has_it_is_not():
         assert refused.certificate is not None
         assert refused.certificate.verified
         (proof,) = refused.certificate.proofs
+        assert refused.method == ("convex" if isinstance(proof, OuterBound) else "dual bound")
         by_cones += isinstance(proof, OuterBound)
     assert by_cones >= 3
 
