@@ -99,7 +99,7 @@ def prove_free_time(task: ConvexTask, likely: float | None = None) -> Certificat
     """Certificate for a free time of flight: Farkas proofs at the times that no other bound forbids.
 
     Dual bounds forbid all times but a span; where they show none, closed-form bounds forbid all but a window.
-    The proofs are made at both ends and on a grid between; between its times nothing is proved.
+    The proofs are made at both ends, midway and on a grid between; between its times nothing is proved.
 
     Args:
         task: what was to be solved.
@@ -121,9 +121,9 @@ def prove_free_time(task: ConvexTask, likely: float | None = None) -> Certificat
     times, beyond = window.grid(), "closed-form bounds"
     if outer is not None:
         low, high = outer.before.longest, outer.after.shortest
-        times, beyond = TimeWindow(low, high).grid(), f"dual bounds, up to {low:.4g} and from {high:.4g} s"
-        if likely is not None and low < likely < high:
-            times = np.union1d(times, likely)
+        beyond = f"dual bounds, up to {low:.4g} and from {high:.4g} s"
+        inside = [time for time in (0.5 * (low + high), likely) if time is not None and low < time < high]
+        times = np.union1d(TimeWindow(low, high).grid(), inside)  # a proof is hardest far from the ends
     proofs: list[FarkasProof] = []
     for time in times:
         proof = prove_at(task, float(time))
