@@ -107,6 +107,24 @@ def test_the_kink_of_a_touch_bounds_its_neighbours_without_a_search():
     assert np.median(gaps) < 0.03
 
 
+def test_proofs_that_use_a_touch_name_the_altitude():
+    """Tanks that pay for no flight: what forbids each is what its bound uses."""
+    rng, kinked, free = np.random.default_rng(5), 0, 0
+    starts = np.array([harsh_start(rng) for _ in range(100)])
+    found = solve_pdg_many(starts, TARGET, fallback=False)
+    for k in np.flatnonzero(found.infeasible).tolist():
+        certificate = found.certificate(k)
+        assert certificate is not None
+        (bound,) = certificate.proofs
+        assert isinstance(bound, DualBound)
+        touches_ground = any(piece.path_multiplier[2] > 0.0 for piece in bound.pieces)
+        kinked, free = kinked + touches_ground, free + (not touches_ground)
+        assert certificate.causes == ("altitude",) * touches_ground + ("maximum thrust", "propellant")
+        assert not touches_ground or certificate.verified
+    assert kinked >= 2
+    assert free >= 10
+
+
 def test_a_limit_that_is_given_twice_is_refused():
     with pytest.raises(ValueError, match=r"speed_limit and limits\.speed are the same limit"):
         solve_pdg_many(paper_starts(1, 1), TARGET, limits=Limits(speed=60.0), speed_limit=60.0)
