@@ -222,7 +222,7 @@ def bound_start(
         max(vehicle.limits.least_cosine, -1.0),
         vehicle.sine,
         0.0,
-        0.0,  # no limit on the path: its flight keeps them
+        0.0,  # no limit on the path: only the touch of the flight itself, as its primer has it, is used
         False,
     )
     times, cover = bound_by_neighbours(x, problem, case, target, exhaust)

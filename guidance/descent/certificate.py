@@ -27,8 +27,9 @@ class Certificate:
     Attributes:
         scope: in words, which times of flight and which mesh are covered, and by what.
         causes: the limits that forbid every flight; empty where there are flights.
-        proofs: Farkas proofs (`guidance.convex.farkas`), one per time of flight, or a dual bound
-            (`guidance.descent.dual_bound`); empty if closed-form bounds alone decide.
+        proofs: Farkas proofs (`guidance.convex.farkas`), one per time of flight, a dual bound
+            (`guidance.descent.dual_bound`), or two of them with such proofs between
+            (`guidance.descent.outer_bound`); empty if closed-form bounds alone decide.
         lower_bound: [kg] no flight burns less; inf where there is none.
     """
 

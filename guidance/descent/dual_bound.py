@@ -204,30 +204,6 @@ class DualBound:
         return bounds, 0.125 * steps**2 * np.maximum(bend, 0.0)
 
 
-@dataclass(frozen=True, eq=False)
-class OuterBound:
-    """The tank pays for no flight but perhaps within a span of times: two dual bounds.
-
-    Attributes:
-        before: of all times up to the span.
-        after: of all times from its end on.
-    """
-
-    before: DualBound
-    after: DualBound
-
-    @property
-    def verified(self) -> bool:
-        """Whether both proofs hold."""
-        return self.before.verified and self.after.verified
-
-    def supports(self, lower_bound: float) -> bool:
-        """Whether the claims imply that there is no flight outside the span; nothing else is claimed."""
-        before, after = self.before, self.after
-        outside = before.shortest == 0.0 and before.longest <= after.shortest and math.isinf(after.longest)
-        return math.isinf(lower_bound) and outside and before.above_tank and after.above_tank
-
-
 @dataclass(frozen=True)
 class _ThrustBounds:
     """f, f kappa, l and l/c of the relaxed thrust bounds."""

@@ -9,13 +9,14 @@ import numpy as np
 
 from guidance.arrays import Array, Index
 from guidance.descent.certificate import Certificate
-from guidance.descent.dual_bound import DualBound, DualPiece, OuterBound
+from guidance.descent.dual_bound import DualBound, DualPiece
+from guidance.descent.outer_bound import OuterBound
 from guidance.descent.problem import LandingProblem
 from guidance.flight_time.extremal import touches
 from guidance.flight_time.primer_vector import PrimerFlight
 from guidance.lower_bound.dual_ascent import two_impulse_primer
 from guidance.lower_bound.dual_case import dual_case
-from guidance.lower_bound.dual_function import AFFINE, THETA
+from guidance.lower_bound.dual_function import AFFINE, THETA, linear_part
 from guidance.lower_bound.neighbour_cover import NEIGHBOUR_TOLERANCE, bound_by_neighbours, kinked_primer_of
 from guidance.lower_bound.time_cover import (
     GRANTED,
@@ -128,7 +129,10 @@ def bound_outside(
     for number, primer in enumerate(cover.primers):
         join_cover(primer, number, times, case, envelope, owner)
     below = np.flatnonzero(envelope < target)
+    beyond = linear_part(cover.primers[0], float(times[-1]), case)
     claim = claimed_bound(target, most, exhaust)
+    if beyond < target:  # too little gravity: nothing forbids the times beyond the grid
+        return None
     if below.size == 0:
         return DualBound(problem, most, claim, _pieces(times, owner, cover.primers))
     if below[0] == 0 or below[-1] == envelope.size - 1:
@@ -154,9 +158,7 @@ def certify_cover(
         infeasible: whether the bound lies above what the tank holds: there is no flight then.
     """
     bound = _bound_by_cover(problem, most, times, cover)
-    if infeasible:
-        return Certificate(f"{_SCOPE}: dual bound on the propellant", _CAUSES, (bound,))
-    return Certificate(_SCOPE, (), (bound,), bound.propellant)
+    return certify_bound(bound) if infeasible else Certificate(_SCOPE, (), (bound,), bound.propellant)
 
 
 def _bound_above_tank(

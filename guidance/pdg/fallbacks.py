@@ -21,6 +21,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from guidance.descent.certificate import Certificate
+from guidance.descent.dual_bound import DualBound
 from guidance.descent.plan import Plan, PlanStatus
 from guidance.flight_time.path_limits import PROPELLANT
 from guidance.flight_time.primer_vector import PrimerFlight
@@ -113,30 +114,26 @@ def plan_by_method(request: Request) -> Plan:
 
 
 def _refuse(request: Request) -> Plan | None:
-    """Proof, without a solver, that no flight exists; None where these bounds show none."""
+    """Proof that no flight exists, before any search for one; None where these bounds show none.
+
+    It takes no solver but where the tank lacks next to nothing: there the cones are asked at the times of
+    flight that the dual bound leaves open.
+    """
     from guidance.planning.infeasibility import prove_by_dual_bound, prove_by_window
 
     problem, window = request.problem, time_window(request.problem)
     if window.empty:
-        proof, method, words = prove_by_window(window), "closed form", window.cause
-    else:
-        proof, method, words = (
-            prove_by_dual_bound(problem, request.extremal, window),
-            "dual bound",
-            _OUT_OF_REACH,
-        )
-        overdrawn = request.extremal is not None and request.extremal.broken == PROPELLANT
-        if proof is None and overdrawn and not request.provisional:  # by next to nothing
-            proof = _prove_by_cones(request)
-    return None if proof is None else Plan(PlanStatus.INFEASIBLE, problem, method, message=words, proof=proof)
-
-
-def _prove_by_cones(request: Request) -> Certificate | None:
-    """Proof that no flight exists, with Farkas proofs where the dual bound leaves times open."""
-    from guidance.planning.convex_planner import prove_infeasible
-
-    proof = prove_infeasible(request.problem, request.nodes, None)
-    return proof if isinstance(proof, Certificate) else None
+        proof = prove_by_window(window)
+        return Plan(PlanStatus.INFEASIBLE, problem, "closed form", message=window.cause, proof=proof)
+    proof = prove_by_dual_bound(problem, request.extremal, window)
+    overdrawn = request.extremal is not None and request.extremal.broken == PROPELLANT
+    if proof is None and overdrawn and not request.provisional:
+        proof = request.refusal_by_cones
+    if not isinstance(proof, Certificate):
+        return None
+    by_bound = all(isinstance(part, DualBound) for part in proof.proofs)
+    method = "dual bound" if by_bound else "convex"
+    return Plan(PlanStatus.INFEASIBLE, problem, method, message=_OUT_OF_REACH, proof=proof)
 
 
 def _plan_convex(request: Request) -> Plan:
@@ -279,6 +276,8 @@ def _prove_infeasible(request: Request, anywhere: bool) -> Certificate | ConvexS
         proof = prove_by_dual_bound(request.problem, request.extremal)
         if proof is not None:
             return proof
+    if request.time_of_flight is None and not anywhere:
+        return request.refusal_by_cones
     return prove_infeasible(request.problem, request.nodes, request.time_of_flight, anywhere)
 
 

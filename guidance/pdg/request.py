@@ -4,14 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from guidance.descent.certificate import Certificate
 from guidance.descent.plan import Plan
 from guidance.descent.problem import LandingProblem
 from guidance.flight_time.nearest_landing import NearestLanding, find_nearest_landing
 from guidance.flight_time.primer_vector import PrimerFlight, find_extremal_flight
 from guidance.state import State
+
+if TYPE_CHECKING:
+    from guidance.convex.programme import ConvexSolution
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +60,18 @@ class Request:
         if self.method != "auto" or self.time_of_flight is not None or self.extremal is None:
             return None
         return find_nearest_landing(self.problem, self.extremal, not self.provisional)
+
+    @cached_property
+    def refusal_by_cones(self) -> Certificate | ConvexSolution | None:
+        """Proof that there is no flight, with cones at the times of flight that bounds leave open.
+
+        Or a solution that refutes it, or None where neither was found.
+        """
+        from guidance.planning.convex_task import ConvexTask
+        from guidance.planning.infeasibility import prove_free_time
+
+        likely = None if self.extremal is None else self.extremal.time
+        return prove_free_time(ConvexTask(self.problem, self.nodes), likely)
 
     @property
     def bounds_first(self) -> bool:

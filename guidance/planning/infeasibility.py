@@ -95,13 +95,16 @@ def prove_no_landing_anywhere(problem: LandingProblem, window: TimeWindow) -> Ce
     return None if problem.rotates else prove_no_landing(problem, guess_time(problem, window))
 
 
-def prove_free_time(task: ConvexTask) -> Certificate | ConvexSolution | None:
+def prove_free_time(task: ConvexTask, likely: float | None = None) -> Certificate | ConvexSolution | None:
     """Certificate for a free time of flight: Farkas proofs at the times that no other bound forbids.
 
     Dual bounds forbid all times but a span; where they show none, closed-form bounds forbid all but a window.
+    The proofs are made at both ends and on a grid between; between its times nothing is proved.
 
     Args:
         task: what was to be solved.
+        likely: [s] the time of an extremal, which joins the grid where it lies in the span that dual
+            bounds leave; None if none is known.
 
     Returns:
         The certificate; or a solution, where a time on the grid turns out to be feasible; or None, where a
@@ -113,14 +116,14 @@ def prove_free_time(task: ConvexTask) -> Certificate | ConvexSolution | None:
     if task.problem.rotates:  # no closed form bounds the time of flight
         return None
     outer = bound_outside(task.problem, guess_time(task.problem, window), task.free_landing_point)
-    times, beyond = window.grid(), "closed-form bounds"
     if isinstance(outer, DualBound):
         return certify_bound(outer)
+    times, beyond = window.grid(), "closed-form bounds"
     if outer is not None:
         low, high = outer.before.longest, outer.after.shortest
-        within = times[(low < times) & (times < high)]
-        times = within if within.size > 0 else np.array([0.5 * (low + high)])
-        beyond = f"dual bounds, up to {low:.4g} and from {high:.4g} s"
+        times, beyond = TimeWindow(low, high).grid(), f"dual bounds, up to {low:.4g} and from {high:.4g} s"
+        if likely is not None and low < likely < high:
+            times = np.union1d(times, likely)
     proofs: list[FarkasProof] = []
     for time in times:
         proof = prove_at(task, float(time))
@@ -132,7 +135,9 @@ def prove_free_time(task: ConvexTask) -> Certificate | ConvexSolution | None:
         return None
     causes = tuple(dict.fromkeys(cause for proof in proofs for cause in proof.causes))
     scope = (
-        f"{len(proofs)} times of flight from {min(times):.4g} to {max(times):.4g} s, {task.nodes} nodes, "
-        f"thrust bounds relaxed outward: verified Farkas proofs; all times outside: {beyond}"
+        f"at {len(proofs)} times of flight from {min(times):.4g} to {max(times):.4g} s, not between them, "
+        f"{task.nodes} nodes, thrust bounds relaxed outward: verified Farkas proofs; "
+        f"all times outside: {beyond}"
     )
-    return Certificate(scope, causes, (*proofs, *(() if outer is None else (outer,))))
+    between = tuple(proofs)
+    return Certificate(scope, causes, between if outer is None else (replace(outer, between=between),))

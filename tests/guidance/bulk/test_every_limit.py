@@ -89,7 +89,7 @@ def test_touching_flights_and_those_without_a_coast_are_those_of_single_calls(st
 
 
 def test_the_kink_of_a_touch_bounds_its_neighbours_without_a_search():
-    """Of harsh starts that touch: half are bounded to a decagram of 20 kg, each soundly."""
+    """Of harsh starts that touch: half are bounded to less than 30 g, each soundly."""
     rng, gaps = np.random.default_rng(5), []
     starts = np.array([harsh_start(rng) for _ in range(1500)])
     found = solve_pdg_many(starts, TARGET, fallback=False)
@@ -105,6 +105,24 @@ def test_the_kink_of_a_touch_bounds_its_neighbours_without_a_search():
         assert found.status_of(k) is PlanStatus.OPTIMAL
     assert len(gaps) > 15
     assert np.median(gaps) < 0.03
+
+
+def test_proofs_that_use_a_touch_name_the_altitude():
+    """Tanks that pay for no flight: what forbids each is what its bound uses."""
+    rng, kinked, free = np.random.default_rng(5), 0, 0
+    starts = np.array([harsh_start(rng) for _ in range(100)])
+    found = solve_pdg_many(starts, TARGET, fallback=False)
+    for k in np.flatnonzero(found.infeasible).tolist():
+        certificate = found.certificate(k)
+        assert certificate is not None
+        (bound,) = certificate.proofs
+        assert isinstance(bound, DualBound)
+        touches_ground = any(piece.path_multiplier[2] > 0.0 for piece in bound.pieces)
+        kinked, free = kinked + touches_ground, free + (not touches_ground)
+        assert certificate.causes == ("altitude",) * touches_ground + ("maximum thrust", "propellant")
+        assert not touches_ground or certificate.verified
+    assert kinked >= 2
+    assert free >= 10
 
 
 def test_a_limit_that_is_given_twice_is_refused():

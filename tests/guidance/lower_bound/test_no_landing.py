@@ -8,12 +8,15 @@ from descents import GRAVITY, TARGET, harsh_start
 
 from guidance import PAPER_LANDER, PlanStatus, State, solve_pdg
 from guidance.convex.farkas import FarkasProof
-from guidance.descent.dual_bound import DualBound, OuterBound
+from guidance.descent.certificate import Certificate
+from guidance.descent.dual_bound import DualBound
+from guidance.descent.outer_bound import OuterBound
 from guidance.descent.problem import LandingProblem
 from guidance.flight_time.primer_vector import find_extremal_flight
 from guidance.flight_time.time_window import guess_time, time_window
 from guidance.lower_bound import bound_outside, prove_no_landing
 from guidance.planning.convex_task import ConvexTask
+from guidance.planning.infeasibility import prove_free_time
 from guidance.planning.minimum_propellant import minimise_over_time
 
 GRAM = 1e-3
@@ -96,7 +99,9 @@ def test_a_tank_that_lacks_a_gram_is_refused_and_one_that_has_it_is_not():
         assert refused.status is PlanStatus.INFEASIBLE
         assert refused.certificate is not None
         assert refused.certificate.verified
-        by_cones += any(isinstance(proof, FarkasProof) for proof in refused.certificate.proofs)
+        (proof,) = refused.certificate.proofs
+        assert refused.method == ("convex" if isinstance(proof, OuterBound) else "dual bound")
+        by_cones += isinstance(proof, OuterBound)
     assert by_cones >= 3
 
 
@@ -109,15 +114,51 @@ def test_cones_are_asked_only_at_times_that_the_bound_leaves_open():
             continue
         found += 1
         assert outer.verified
-        assert outer.supports(np.inf)
+        assert outer.forbids_outside
+        assert not outer.supports(np.inf)  # of the span it says nothing
+        assert not Certificate("", (), (outer,)).verified
         assert outer.after.shortest < 1.3 * outer.before.longest
         assert not outer.supports(1.0)
-        assert not OuterBound(outer.after, outer.before).supports(np.inf)
+        assert not OuterBound(outer.after, outer.before).forbids_outside
         dearer = replace(outer.before, bound=1.01 * outer.before.bound)
         assert not replace(outer, before=dearer).verified
         richer = replace(problem, lander=replace(problem.lander, dry_mass=dry_mass - 1.0))
-        assert not replace(outer, before=replace(outer.before, problem=richer)).supports(np.inf)
+        assert not replace(outer, before=replace(outer.before, problem=richer)).forbids_outside
     assert found >= 5
+
+
+def test_cones_prove_both_ends_of_the_open_span_and_the_extremals_time():
+    found = 0
+    for start, dry_mass, _ in tanks_on_the_edge(18, 4):
+        problem = problem_from(start, dry_mass + GRAM)
+        flight = find_extremal_flight(problem)
+        assert flight is not None
+        certificate = prove_free_time(ConvexTask(problem, 61), flight.time)
+        assert isinstance(certificate, Certificate)
+        (outer,) = certificate.proofs
+        if not isinstance(outer, OuterBound):
+            continue
+        found += 1
+        assert certificate.verified
+        times = [proof.time for proof in outer.between]
+        low, high = outer.before.longest, outer.after.shortest
+        assert times[0] == low
+        assert times[-1] == high
+        assert len(times) >= 4
+        assert flight.time in times or not low < flight.time < high
+        assert all(isinstance(proof, FarkasProof) for proof in outer.between)
+        for part in (outer.between[1:], outer.between[:-1], outer.between[::-1], ()):
+            assert not replace(certificate, proofs=(replace(outer, between=part),)).verified
+    assert found >= 3
+
+
+@pytest.mark.parametrize("time", [0.01, 0.1])
+def test_without_gravity_nothing_is_claimed_beyond_the_last_time_of_the_grid(time):
+    """From rest the longest flights burn next to nothing, though each time of the grid may be too short."""
+    lander = replace(PAPER_LANDER, dry_mass=1199.9, min_thrust=0.0)
+    start = State.parse([0.0, 0.0, 500.0, 0.0, 0.0, 0.0, 1200.0])
+    problem = LandingProblem(start, np.zeros(3), lander, np.zeros(3))
+    assert bound_outside(problem, time) is None
 
 
 @pytest.mark.parametrize("seed", [3, 4])
