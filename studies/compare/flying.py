@@ -122,7 +122,7 @@ def rehearse(study: Study, console: Console, workers: int = 1) -> float:
             fly_chunk(alone, 0, 1)
             seconds += perf_counter() - began
             display.advance(1)
-    with suppress(OSError):  # nowhere to write: nothing is kept there either
+    with suppress(OSError, UnicodeError):  # nowhere to write, or a name of odd bytes: it is rehearsed again
         kernel_folder().mkdir(parents=True, exist_ok=True)
         flown = sorted(_read_flown() | _lines_of(study))
         _flown_before().write_text("".join(f"{line}\n" for line in flown), encoding="utf-8")
