@@ -2,8 +2,9 @@
 
 Compiled code is kept per user, in a folder named after a hash of the sources of every package here: numba
 itself looks only at the file that defines a kernel, and would go on with stale code after a change in another
-that it calls. Where no folder can be written the kernel is compiled in memory. `LUNAR_HDA_CACHE` moves the
-folder. Never `fastmath`: it drops NaN checks and changes sums.
+that it calls. Where no folder can be written, or a later numba keeps its files in another way, the kernel is
+compiled in memory. `LUNAR_HDA_CACHE` moves the folder. Never `fastmath`: it drops NaN checks, and changes
+sums.
 """
 
 from __future__ import annotations
@@ -18,7 +19,6 @@ from typing import Any, Literal, TypeVar, cast
 import numba
 import platformdirs
 from numba.core import config
-from numba.core.caching import IndexDataCacheFile
 
 Function = TypeVar("Function", bound=Callable[..., object])
 _numba_config = cast("Any", config)  # numba names its settings at run time
@@ -46,14 +46,15 @@ def kernel_folder() -> Path:
     return cache_folder() / "kernels" / source_hash()
 
 
-class _SignatureFiles(IndexDataCacheFile):
+class _SignatureFiles:
     """A kernel's files of compiled code, each named after the types of its arguments.
 
     numba numbers them, so that two processes that compile a kernel for different types at the same time may
-    give both the same number, and one of them later runs the other's code.
+    give both the same number, and one of them later runs the other's code. This goes before numba's own
+    class, of which it uses what numba does not publish.
     """
 
-    def save(self, key: Any, data: Any) -> None:
+    def save(self: Any, key: Any, data: Any) -> None:
         """Keep the code of one signature: before the index names it, so that no reader misses it."""
         stem = self._index_name.removesuffix(".nbi")
         name = f"{stem}.{hashlib.sha256(repr(key).encode()).hexdigest()[:16]}.nbc"
@@ -61,6 +62,17 @@ class _SignatureFiles(IndexDataCacheFile):
         overloads = self._load_index()
         if overloads.get(key) != name:
             self._save_index({**overloads, key: name})
+
+
+_UNPUBLISHED = ("_index_name", "_save_data", "_load_index", "_save_index")
+
+
+def _name_files_by_signature(compiled: Any) -> None:
+    """Make a kernel name its files after signatures; AttributeError or TypeError where numba has changed."""
+    files = compiled._cache._cache_file
+    for name in _UNPUBLISHED:
+        getattr(files, name)
+    files.__class__ = type("SignatureFiles", (_SignatureFiles, type(files)), {})
 
 
 def compile_kernel(
@@ -72,14 +84,15 @@ def compile_kernel(
     """
     if _numba_config.DISABLE_JIT:
         return function
-    compiled = numba.njit(nogil=True, parallel=parallel, error_model=error_model)(function)
+    compiler = numba.njit(nogil=True, parallel=parallel, error_model=error_model)
+    compiled = compiler(function)
     before = _numba_config.CACHE_DIR
     try:
         _numba_config.CACHE_DIR = str(kernel_folder())
         compiled.enable_caching()
-        cast("Any", compiled)._cache._cache_file.__class__ = _SignatureFiles
-    except (RuntimeError, OSError):
-        pass  # nowhere to write: compile in memory
+        _name_files_by_signature(compiled)
+    except (RuntimeError, OSError, AttributeError, TypeError):
+        compiled = compiler(function)  # in memory: there is nowhere to write, or files might be mixed up
     finally:
         _numba_config.CACHE_DIR = before
     return cast("Function", compiled)

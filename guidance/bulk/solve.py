@@ -89,9 +89,11 @@ def solve_pdg_many(
     """Plan the descents of least propellant from N states to one target, from one to N, or from N to N.
 
     Compiled code answers the starts whose flight the indirect method finds, within every limit, and proves
-    what no flight undercuts; `solve_pdg` answers the rest, one after another on one core, each in a
-    millisecond to a few hundred. That is every start with a target velocity, a turning site, a least thrust
-    or a limited thrust rate; of other starts, those whose flight breaks a limit.
+    what no flight undercuts; `solve_pdg` answers the rest, one after another on one core. That is every start
+    with a target velocity, a turning site, a least thrust or a limited thrust rate, without gravity, at its
+    target's altitude, or with an engine that hardly lifts it or does not. Of other starts it is those for
+    which the compiled code finds no flight, finds one that breaks a limit, or finds one that burns more than
+    there is and cannot prove that all do.
 
     Args:
         states: State or (x, y, z, vx, vy, vz, mass), shape (7,) or (N, 7).

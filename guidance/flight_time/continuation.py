@@ -171,7 +171,7 @@ def _set_lowest(problem: PrimerProblem, x: Extremal) -> bool:
         if before < 0.0 <= after:
             share, part = before / (before - after), x.times[0] / LEGS
             x.touch[0], x.touch[1] = (k + share) * part, 0.0
-            x.touch[2] = path.position[k, 2] + 0.5 * share * share * part * before
+            x.touch[2] = path.position[k, 2] + 0.5 * share * part * before
             return x.touch[2] < 0.0
     return False
 

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -46,6 +47,7 @@ _FULL = 1.0 - 1e-9  # of the tank: the nearest landing leaves that little of it
 _MOST_FAILURES = 6  # on the way to an empty tank
 _SHORT_COAST = 0.1  # of the time of flight: one so short is vanishing
 _SLIVER = 1e-2  # of the time of flight: a first burn so short may have to vanish
+_NONE, _NEAREST, _CHEAPEST = range(3)  # what `_seek_nearest` found
 
 
 @compile_kernel
@@ -147,6 +149,14 @@ def solve_nearest(
     return False
 
 
+class _Search(NamedTuple):
+    """How a landing point is sought."""
+
+    touching: bool  # the flight touches the ground
+    anew: bool  # it is still to be found, and the point is near the answer
+    thorough: bool  # as of `find_nearest_landing`
+
+
 @dataclass(frozen=True, eq=False)
 class NearestLanding:
     """A flight to a point near the target, or what is left of the search for one.
@@ -155,11 +165,14 @@ class NearestLanding:
         problem: the landing there.
         flight: the flight of least propellant to it; None where none was found.
         time: [s] its time of flight; without one, that of the last extremal on the way to it.
+        cheapest: whether the flight is the cheapest within the granted error; else it is the nearest, which
+            leaves the tank all but empty, because that one was not found.
     """
 
     problem: LandingProblem
     flight: PrimerFlight | None
     time: float
+    cheapest: bool = False
 
 
 def find_nearest_landing(
@@ -173,30 +186,31 @@ def find_nearest_landing(
         thorough: whether fuller tanks may lead there, or the cheapest flight be given up for the nearest.
 
     Returns:
-        The flight; or none, where none was found or the one found breaks a limit of the problem.
+        The flight; or none, where none was found or the one found breaks a limit of the problem. Its
+        `cheapest` says whether it is not the nearest in its place.
     """
-    none = NearestLanding(problem, None, overdrawn.time)
+    not_found = NearestLanding(problem, None, overdrawn.time)
     if overdrawn.broken != PROPELLANT or problem.limits.line_of_sight is not None:
-        return none
+        return not_found
     x, unit = blank_extremal(), problem.lander.max_thrust / problem.state.mass
     copy_extremal(overdrawn.extremal, x)
     goal = -math.expm1(-problem.log_mass_ratio), ERROR_SLACK / unit
     point, touching = np.zeros(2), thorough and bool(touches(x))
     for attempt in range(2):
-        found = _seek_nearest(overdrawn.scaled, goal, (touching, attempt > 0, thorough), x, point)
-        none = replace(none, time=float(x.times[2]))
-        if not found:
-            return none
+        found = _seek_nearest(overdrawn.scaled, goal, _Search(touching, attempt > 0, thorough), x, point)
+        not_found = replace(not_found, time=float(x.times[2]))
+        if found == _NONE:
+            return not_found
         target = problem.target.copy()
         target[:2] += unit * point
         there = replace(problem, target=target)
         flight = fly_to(there, x, TOUCHING if touching else FREE)
         if flight is not None and flight.broken == KEPT:
-            return NearestLanding(there, flight, flight.time)
+            return NearestLanding(there, flight, flight.time, found == _CHEAPEST)
         if flight is None or touching or flight.broken != ALTITUDE:
-            return none
+            return not_found
         touching = True
-    return none
+    return not_found
 
 
 @compile_kernel
@@ -240,21 +254,19 @@ def _by_fuller_tanks(
 
 @compile_kernel
 def _seek_nearest(
-    problem: PrimerProblem,
-    goal: tuple[float, float],
-    how: tuple[bool, bool, bool],
-    x: Extremal,
-    point: Array,
-) -> bool:
+    problem: PrimerProblem, goal: tuple[float, float], how: _Search, x: Extremal, point: Array
+) -> int:
     """Find the cheapest landing within the granted error, in place.
 
     Args:
         problem: that of the target, in seconds.
         goal: the share of the start mass that is propellant, and the error granted beside ERROR_SHARE.
-        how: whether the flight touches the ground; whether it is still to be found, and `point` is near the
-            answer; and whether to be thorough, as of `find_nearest_landing`.
+        how: it is sought.
         x: the extremal to the point; the answer.
         point: where to begin; the answer.
+
+    Returns:
+        _CHEAPEST; _NEAREST, where only the nearest was found and the search is thorough; or _NONE.
     """
     share, slack = goal
     touching, anew, thorough = how
@@ -266,19 +278,19 @@ def _seek_nearest(
         there = PrimerProblem(place, v, g, flow)
         found = solve_touching(there, x) or (thorough and solve_touching_from_edge(there, x))
         if not found or not x.touch[1] > 0.0:
-            return False
+            return _NONE
     known, begin, tank = new_extremal(), point.copy(), share * _FULL if thorough else share
     copy_extremal(x, known)
     found = solve_nearest(point, problem, (tank, math.nan), size, x)
     if not found and thorough and not touching:
         found = _by_fuller_tanks(problem, tank, (known, begin), x, point)
     if not found:
-        return False
+        return _NONE
     copy_extremal(x, known)
     begin[:] = point
     far = (1.0 + ERROR_SHARE) * math.hypot(point[0], point[1]) + slack
     if solve_nearest(point, problem, (share, far), size, x):
-        return True
+        return _CHEAPEST
     copy_extremal(known, x)
     point[:] = begin
-    return thorough
+    return _NEAREST if thorough else _NONE

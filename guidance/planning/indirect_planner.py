@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from guidance.descent.certificate import Certificate
 from guidance.descent.plan import Plan, PlanStatus
@@ -16,6 +17,8 @@ NOT_FOUND = (
     "the indirect method found no flight that keeps the limits; it knows no least thrust, no velocity at the"
     " target and no limit that binds but a touch of the ground, and method 'auto' asks others then"
 )
+
+TANK_ALL_BUT_EMPTY = "the tank is all but empty: no cheaper flight to a point next to it was found"
 
 
 def plan_indirect(
@@ -50,9 +53,11 @@ def plan_nearest_indirect(problem: LandingProblem, nodes: int, nearest: NearestL
         nearest: what `find_nearest_landing` found; None if it was not asked.
 
     Returns:
-        A plan that is NEAREST; or LIMIT_REACHED where the method finds none.
+        A plan that is NEAREST, whose message says where it is not the cheapest next to the nearest point; or
+        LIMIT_REACHED where the method finds none.
     """
     if nearest is None or nearest.flight is None:
         return Plan(PlanStatus.LIMIT_REACHED, problem, METHOD, message=NOT_FOUND)
     laid = lay_nodes(nearest.problem, nearest.flight, nodes)
-    return Plan.of_flight(PlanStatus.NEAREST, problem, METHOD, laid)
+    plan = Plan.of_flight(PlanStatus.NEAREST, problem, METHOD, laid)
+    return plan if nearest.cheapest else replace(plan, message=f"{plan.message}; {TANK_ALL_BUT_EMPTY}")

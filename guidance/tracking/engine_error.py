@@ -45,6 +45,8 @@ def assumed_error(
 
     With e assumed to be h, an engine at -b lacks the share x = (b + h) / (1 + h) of what the first burning
     period asks for. h is the greatest for which the next three periods can give that on top of their own.
+    Those of the three that lie beyond the next look count too. The engine's error is another one there and
+    is not known in the first of them, so that a burn which begins that shortly before a look may get less.
 
     Args:
         reference: what is flown.

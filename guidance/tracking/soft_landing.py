@@ -76,7 +76,7 @@ class SoftLanding:
         status: OPTIMAL, NEAREST (the site was out of reach), or why there is no flight.
         reference: the whole descent at the control instants, to the ground; None without a flight.
         plan: the planner's answer for the way to the gate, in the frame in which the gate is passed at rest;
-            None where no flight near an earlier one was found.
+            None where no flight near an earlier one was found, or the planner could not be asked.
     """
 
     status: PlanStatus
@@ -210,7 +210,9 @@ def plan_timed_landing(
         gravity: [m/s^2] shape (3,), along -z.
 
     Returns:
-        The landing; LIMIT_REACHED where no flight of this time reaches the site.
+        The landing; without a flight of this time, with the planner's status and plan. As of `replan`,
+        INFEASIBLE is then what the solver found, without a certificate. Where the planner cannot be asked, as
+        no time is left before the gate or the moving frame starts below it, LIMIT_REACHED and no plan.
 
     Raises:
         ValueError: an argument is out of range.
@@ -219,8 +221,10 @@ def plan_timed_landing(
     approach, speed = _approach_gate(state, site, lander, control_period, options, gravity)
     before_gate = (periods - options.terminal_periods) * control_period
     plan = approach.solve(before_gate, speed, nearest=False) if before_gate > 0.0 else None
-    if plan is None or plan.status is not PlanStatus.OPTIMAL:
+    if plan is None:
         return SoftLanding(PlanStatus.LIMIT_REACHED, None, None)
+    if not plan.status.has_flight:
+        return SoftLanding(plan.status, None, plan)
     return SoftLanding(PlanStatus.OPTIMAL, sample_descent(plan, speed, control_period, options), plan)
 
 

@@ -22,7 +22,7 @@ from guidance.validation import finite_number
 from hda.policies.adjusted_descent import AdjustedDescent
 from hda.policies.beliefs.belief import GroundBelief
 from hda.policies.beliefs.surroundings import infer_unseen
-from hda.policies.hazard_aware import HazardAwareSite, fuse_look
+from hda.policies.hazard_aware import HazardAwareSite, fuse_look, landing_spread
 from hda.policies.landing_dispersion import landing_probability
 from hda.policies.planned_descent import DescentMemory
 from hda.policies.site_price import HazardAwareWeights
@@ -41,7 +41,8 @@ class DeferredDecisionOptions:
         separation: [m] least distance between two of them, along one axis at least.
         budget: [kg] by which each branch may exceed its candidate's cheapest flight.
         failure_cost: [kg] of propellant that a failed landing is worth, in the ranking.
-        dispersion: [m] standard deviation of the touchdown about the site, along each axis.
+        dispersion: [m] standard deviation of the touchdown about the site, along each axis, before that of a
+            filter is added (`landing_spread`).
         switch_gain: [kg] by which another site must be better than the present one to come first.
         keep_probability: a site committed to is kept while a landing there is at least this likely to be
             safe.
@@ -152,7 +153,7 @@ class DeferredDecisionPolicy:
         safe = infer_unseen(belief.probability(), belief.seen)
         present = belief.cell(observation.target)
         if memory.committed and present is not None:
-            landing = landing_probability(safe, self.options.dispersion, present)
+            landing = landing_probability(safe, self._spread(observation), present)
             if landing >= self.options.keep_probability:
                 return self._fly_to(observation.target, observation, memory)
         price = self._ranking().price_by(safe, observation, memory.view, belief)
@@ -172,6 +173,10 @@ class DeferredDecisionPolicy:
                 commit_time=_NEVER,
             )
         )
+
+    def _spread(self, observation: Observation) -> float:
+        """[m] scatter of a landing, as the ranking counts it: of control, and of a filter if there is one."""
+        return landing_spread(observation, self.options.dispersion)
 
     def _choose(
         self, price: Array, safe: NDArray[np.float32], observation: Observation, belief: GroundBelief
@@ -197,8 +202,8 @@ class DeferredDecisionPolicy:
         sites = np.array([observation.settled(belief.site(*cell, plane)) for cell in cells])
         if cells[0] == present:
             sites[0] = observation.target
-        dispersion = self.options.dispersion
-        return Candidates(sites, np.array([landing_probability(safe, dispersion, cell) for cell in cells]))
+        spread = self._spread(observation)
+        return Candidates(sites, np.array([landing_probability(safe, spread, cell) for cell in cells]))
 
     def _defer(
         self, observation: Observation, candidates: Candidates, memory: DeferredDecisionMemory

@@ -34,13 +34,14 @@ class WaitingDescent:
 
     While no more than `look_time` is left of the flight and nothing was seen, each look plans a landing one
     decision interval later than the last plan: the next look comes as long before the landing as this one. It
-    ends with the first map, or where the flight would leave less than `reserve` of the propellant on board.
-    On a sensor that always brings a map it is `AdjustedDescent`.
+    ends with the first map, or where the later plan would come to the gate with less than `reserve` of the
+    propellant on board. On a sensor that always brings a map it is `AdjustedDescent`.
 
     Attributes:
         adjusted: flies otherwise.
         look_time: [s] what a first look should leave of the flight.
-        reserve: share of the propellant on board that the later landing leaves in the tank.
+        reserve: share of the propellant on board that the later plan leaves in the tank at the gate. The
+            terminal phase, and what a late divert costs, are paid from it.
     """
 
     adjusted: AdjustedDescent = field(default_factory=AdjustedDescent)

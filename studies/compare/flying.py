@@ -122,25 +122,31 @@ def rehearse(study: Study, console: Console, workers: int = 1) -> float:
             fly_chunk(alone, 0, 1)
             seconds += perf_counter() - began
             display.advance(1)
-    with suppress(OSError):  # nowhere to write: nothing is kept there either
+    with suppress(OSError, UnicodeError):  # nowhere to write, or a name of odd bytes: it is rehearsed again
         kernel_folder().mkdir(parents=True, exist_ok=True)
-        _flown_before().write_text("".join(f"{name}\n" for name in sorted({*_read_flown(), *names})))
+        flown = sorted(_read_flown() | _lines_of(study))
+        _flown_before().write_text("".join(f"{line}\n" for line in flown), encoding="utf-8")
     return seconds
 
 
 def is_compiled(study: Study) -> bool:
-    """Whether each policy has flown at these sources on this machine: what is left is to load its code."""
-    return set(quick_policies(study)) <= _read_flown()
+    """Whether each policy has flown on the preset at these sources on this machine: its code loads."""
+    return _lines_of(study) <= _read_flown()
 
 
 def _flown_before() -> Path:
-    """Names of the policies that a rehearsal flew, beside the code that it compiled."""
+    """What a rehearsal flew, a preset and a policy a line, beside the code that it compiled."""
     return kernel_folder() / "rehearsed.txt"
+
+
+def _lines_of(study: Study) -> set[str]:
+    """The preset's name and that of each policy: a preset decides what of a policy is compiled."""
+    return {f"{study.preset.name} {name}" for name in quick_policies(study)}
 
 
 def _read_flown() -> set[str]:
     try:
-        return set(_flown_before().read_text().split())
+        return set(_flown_before().read_text(encoding="utf-8").splitlines())
     except (OSError, UnicodeError):
         return set()
 

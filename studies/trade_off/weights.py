@@ -8,10 +8,10 @@ from __future__ import annotations
 from dataclasses import fields, replace
 
 from guidance.validation import unknown_name
-from hda.policies.adjusted_descent import AdjustedDescent
 from hda.policies.composition import ComposedPolicy
 from hda.policies.hazard_aware import HazardAwareSite
 from hda.policies.site_price import HazardAwareWeights
+from hda.policies.waiting_descent import WaitingDescent
 
 SWEEP: dict[str, tuple[float, ...]] = {
     "failure_cost": (2.0, 20.0, 200.0, 20000.0),
@@ -35,7 +35,7 @@ def change_weight(weight: str, value: float) -> ComposedPolicy:
     if weight not in names:
         raise ValueError(unknown_name("weight", weight, names))
     weights = replace(HazardAwareWeights(), **{weight: value})
-    return ComposedPolicy(sweep_name(weight, value), HazardAwareSite(weights), AdjustedDescent())
+    return ComposedPolicy(sweep_name(weight, value), HazardAwareSite(weights), WaitingDescent())
 
 
 def sweep_name(weight: str, value: float) -> str:

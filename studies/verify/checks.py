@@ -8,6 +8,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from io import StringIO
+from itertools import zip_longest
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -21,8 +22,8 @@ from studies.campaign.provenance import CHECKSUMS, digest_file, identify_study, 
 from studies.compare.command import summarize_study
 from studies.compare.differences import compare_pairs, write_paired
 from studies.compare.scores import StudyScores, score_study
-from studies.compare.table import REFERENCE_POLICY, PolicySummary, write_table
-from studies.verify.held_results import EPISODES, HeldResults
+from studies.compare.table import REFERENCE_POLICY, PolicySummary, write_markdown, write_table
+from studies.verify.held_results import EPISODES, PROVENANCE, HeldResults
 
 _RELATIVE_TOLERANCE, _TOLERANCE = 1e-6, 1e-5
 """`episodes.csv` holds nine digits of what the tables were worked out from: of a thrust, 5e-6 N."""
@@ -53,7 +54,7 @@ def check_checksums(folder: Path) -> Finding:
         listed = {name: digest for digest, name in (line.split("  ", 1) for line in lines)}
     except FileNotFoundError:
         return Finding("checksums", False, f"{CHECKSUMS} is missing")
-    except (ValueError, UnicodeDecodeError):
+    except ValueError:
         return Finding("checksums", False, f"{CHECKSUMS} is damaged")
     present = set(list_products(folder))
     lacking = [name for name in listed if name not in present and not name.startswith("shards/")]
@@ -69,14 +70,17 @@ def check_software(results: HeldResults) -> Finding:
     try:
         here = json.loads(json.dumps(identify_study(results.study), default=str))
     except ImportError as error:
-        return Finding("software", False, f"a policy of the study is not here: {error}")
+        return Finding("software", False, f"something of the study is not installed here: {error}")
     there = {name: results.provenance.get(name) for name in here}
     faults = list(name_differences(there, here))
     finding = _judge("software", faults, "versions, preset, sources and weights are the same")
-    commit = results.provenance.get("git_commit")
-    if finding.passed or not isinstance(commit, str):
+    if finding.passed:
         return finding
-    return Finding("software", False, f"{finding.words}; it was flown at commit {commit}")
+    if all(fault.startswith("preset.") for fault in faults):
+        advice = "the study varied the preset, and such a point cannot be verified"
+    else:
+        advice = f"it was flown at commit {results.provenance.get('git_commit')}: verify it there"
+    return Finding("software", False, f"{finding.words}; {advice}")
 
 
 def check_policies(results: HeldResults) -> Finding:
@@ -129,16 +133,34 @@ def check_tables(
         write_table(worked_out / "table.csv", summaries)
         write_paired(worked_out / "paired.csv", compare_pairs(scores, results.policies))
         unpaired = scores.reference != REFERENCE_POLICY
-        for name, unknown in (("table.csv", _OF_THE_REFERENCE if unpaired else ()), ("paired.csv", ())):
-            if (results.folder / name).exists() and not (unpaired and name == "paired.csv"):
-                there, here = ((place / name).read_bytes() for place in (results.folder, worked_out))
-                faults = list(_differing_cells(there.decode(errors="replace"), here.decode(), unknown))
-                yield _judge(name, faults, f"follows from {EPISODES}")
+        write_markdown(worked_out / "table.md", summaries)
+        names = ["table.csv", "table.md"] if unpaired else ["table.csv", "paired.csv", "table.md"]
+        for name in (name for name in names if (results.folder / name).exists()):
+            places = (results.folder, worked_out)
+            there, here = ((place / name).read_text("utf-8", "replace") for place in places)
+            if name == "table.md":
+                faults = _differing_lines(there, here)
+            else:
+                faults = _differing_cells(there, here, _OF_THE_REFERENCE if unpaired else ())
+            yield _judge(name, list(faults), f"follows from {EPISODES}")
+
+
+def list_unchecked(folder: Path) -> list[str]:
+    """Products that no check reads, but for their checksums."""
+    checked = {EPISODES, PROVENANCE, "episodes.parquet", "paired.csv", "table.csv", "table.md"}
+    return [name for name in list_products(folder) if name not in checked and not name.startswith("shards/")]
 
 
 def summarize_results(results: HeldResults, scores: StudyScores) -> list[PolicySummary]:
     """The table's line of every policy in the folder, from its episodes."""
     return summarize_study(replace(results.study, policies=results.policies), scores)
+
+
+def _differing_lines(there: str, here: str) -> Iterator[str]:
+    """Name the lines in which two documents differ."""
+    for number, (held, found) in enumerate(zip_longest(there.splitlines(), here.splitlines()), start=1):
+        if held != found:
+            yield f"line {number} is {held!r} for {found!r}"
 
 
 def _differing_cells(there: str, here: str, unknown: Sequence[str]) -> Iterator[str]:

@@ -70,22 +70,25 @@ def verify_results(
         What was found. Nothing flies where the folder contradicts itself or was flown by other software.
 
     Raises:
-        ValueError: an argument is out of range, or a policy raised something in flight.
+        ValueError: an argument is out of range.
     """
     finite_number("share", share, at_least=0.0, at_most=1.0)
     finite_number("least", least, at_least=1)
     finite_number("workers", workers, at_least=1)
     findings = [check_checksums(folder)]
+    if not findings[-1].passed:
+        return Verification(tuple(findings))
     try:
         results = read_results(folder)
     except HeldResultsError as error:
         return Verification((*findings, Finding("contents", False, str(error))))
-    findings.append(check_policies(results))
-    if not findings[-1].passed:
-        return Verification(tuple(findings), results=results)
+    for check in (check_software, check_policies):
+        findings.append(check(results))
+        if not findings[-1].passed:
+            return Verification(tuple(findings), results=results)
     scores = score_results(results)
     summaries = tuple(summarize_results(results, scores))
-    findings += [check_software(results), *filter(None, [check_parquet(results)])]
+    findings += filter(None, [check_parquet(results)])
     findings += check_tables(results, scores, summaries)
     if not all(finding.passed for finding in findings):
         return Verification(tuple(findings), results=results, summaries=summaries)

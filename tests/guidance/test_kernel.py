@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Any, cast
 
+import numba.core.caching
 import numpy as np
 import pytest
 
@@ -35,3 +36,13 @@ def test_what_one_process_compiled_another_loads(tmp_path: Path, monkeypatch: py
     assert again(4) == 8
     assert sum(again.stats.cache_hits.values()) == 1
     assert file.stat().st_mtime_ns == written
+
+
+@pytest.mark.parametrize("name", ["_load_index", "_save_data"])
+def test_without_what_numba_does_not_publish_it_compiles_in_memory(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("LUNAR_HDA_CACHE", str(tmp_path))
+    monkeypatch.delattr(numba.core.caching.IndexDataCacheFile, name)
+    assert compile_kernel(double)(3) == 6
+    assert not list(tmp_path.rglob("*.nb?"))

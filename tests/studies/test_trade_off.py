@@ -13,6 +13,7 @@ import hda
 from hda import registry
 from hda.flight.episode import fly
 from hda.flight.episode_row import MEASURES
+from hda.policies.composition import ComposedPolicy
 from hda.policies.hazard_aware import HazardAwareSite
 from hda.policies.site_price import HazardAwareWeights
 from hda.registry import make_policy
@@ -69,6 +70,12 @@ def test_a_weight_at_its_default_flies_as_hazard_aware() -> None:
     same = fly(make_policy(sweep_path("failure_cost", default)), scenario)
     assert same.policy == sweep_name("failure_cost", default)
     assert np.array_equal(same.path, plain.path)
+
+
+def test_a_changed_weight_is_flown_by_the_law_of_hazard_aware() -> None:
+    plain = make_policy("hazard-aware")
+    assert isinstance(plain, ComposedPolicy)
+    assert change_weight("failure_cost", 20.0).guidance_law == plain.guidance_law
 
 
 def test_sweeps_leave_the_default_out() -> None:

@@ -3,7 +3,9 @@
 import json
 import shutil
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +16,9 @@ from studies.campaign.claimed_folder import Existing
 from studies.campaign.points import Point, fly_points
 from studies.campaign.provenance import CHECKSUMS, digest_files, write_checksums
 from studies.compare.command import Comparison, compare, plan_study
+from studies.failures.command import Failures, show_failures
 from studies.verify.command import Verify, main, show_verification
+from studies.verify.entries import LEADERBOARD_HEADINGS, entry_faults, leaderboard_lines
 from studies.verify.flights import chance_of_notice, choose_episodes
 from studies.verify.held_results import HeldResultsError, read_results
 from studies.verify.verification import Verification, verify_results
@@ -54,13 +58,51 @@ def edit(path: Path, change: Callable[[str], str], sealed: bool = True) -> None:
 
 
 def test_our_own_folder_is_accepted(flown: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    found = show_verification(Verify(flown, seed=3, workers=1, entry=True))
-    assert found.accepted
-    assert found.flown == tuple(range(EPISODES))
+    assert verify(flown).flown == tuple(range(EPISODES))
+    assert show_verification(Verify(flown, seed=3, workers=1))
     printed = capsys.readouterr().out
     assert f"{flown} is verified" in printed
-    assert "| nearest-safe | paper | 12 | validation |" in printed
-    assert found.digest[:16] in printed
+    assert "not checked, but for its checksum: report.html, timings.csv, trajectories/" in printed
+    assert "12 of 12 episodes, drawn by seed 3" in printed
+
+
+def test_a_small_folder_has_no_entry(flown: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert not show_verification(Verify(flown, seed=3, workers=1, entry=True))
+    assert "no entry for the leaderboard: it has fewer than 1000 episodes" in capsys.readouterr().out
+
+
+def found_again(flown: Path, episodes: int, commit: str | None, **told: Any) -> Verification:
+    """As if so many episodes of a study had been flown, and flown again."""
+    found = verify(flown, least=1)
+    assert found.results is not None
+    study = replace(found.results.study, episodes=episodes, **told)
+    results = replace(found.results, study=study, provenance={"git_commit": commit})
+    return replace(found, results=results, flown=tuple(range(episodes)))
+
+
+def test_only_some_folders_may_stand_on_the_leaderboard(flown: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("studies.verify.entries.git_commit", lambda: "abc")
+    good = found_again(flown, 1000, "abc")
+    assert entry_faults(good) == []
+    assert entry_faults(replace(good, flown=(1, 2))) == ["2 of its episodes were flown again, not all"]
+    assert entry_faults(found_again(flown, 1000, "abc", split="tuning")) == ["it was flown on tuning tiles"]
+    assert entry_faults(found_again(flown, 1000, "abc", study_seed=7)) == ["its study seed is 7, not 0"]
+    assert entry_faults(found_again(flown, 1000, "abd")) == ["it was flown at commit abd, and here is abc"]
+    monkeypatch.setattr("studies.verify.entries.git_commit", lambda: "abc+changes")
+    dirty = found_again(flown, 1000, "abc+changes")
+    assert entry_faults(dirty) == ["its commit has changes that nobody else has"]
+    monkeypatch.setattr("studies.verify.entries.git_commit", lambda: None)
+    assert entry_faults(found_again(flown, 1000, None)) == ["it was flown at commit None, and here is None"]
+
+
+def test_lines_of_the_leaderboard_fit_its_page(flown: Path) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "leaderboard.md").read_text()
+    assert f"| {' | '.join(LEADERBOARD_HEADINGS)} |" in page
+    lines = leaderboard_lines(found_again(flown, EPISODES, "0123456789"))
+    assert len(lines) == len(POLICIES)
+    assert lines[0].startswith("| nearest-safe | paper | 12 validation | 100.0 [")
+    assert "| 0123456 |" in lines[0]
+    assert {line.count("|") for line in lines} == {len(LEADERBOARD_HEADINGS) + 1}
 
 
 def test_a_point_of_another_study_is_accepted_too(tmp_path: Path) -> None:
@@ -135,6 +177,19 @@ def test_tables_must_follow_from_the_episodes(copied: Path) -> None:
     assert words.startswith("table.csv: nearest-safe, safe_site_percent: 99 for 100")
 
 
+def test_a_flattered_document_is_refused(copied: Path) -> None:
+    edit(copied / "table.md", lambda text: text.replace("| nearest-safe | 100.0", "| nearest-safe | 99.0"))
+    (words,) = refusals(verify(copied))
+    assert words.startswith("table.md: line 5 is ")
+
+
+def test_a_folder_with_figures_and_failures_that_was_resumed_is_accepted(copied: Path) -> None:
+    compare(Comparison(episodes=EPISODES, policies=POLICIES, workers=1, out=copied, resume=True))
+    assert any((copied / "figures").iterdir())
+    show_failures(Failures(copied, policies=("no-divert",), most=1))
+    assert verify(copied, least=1).accepted
+
+
 def test_nothing_flies_where_the_folder_contradicts_itself(copied: Path) -> None:
     edit(copied / "table.csv", flatter)
     assert verify(copied).flown == ()
@@ -156,9 +211,20 @@ def test_another_version_is_refused(copied: Path) -> None:
     assert "it was flown at commit" in words
 
 
+def test_a_policy_that_raises_is_refused(copied: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def stumble(*_: object) -> None:
+        raise KeyError("tile")
+
+    monkeypatch.setattr("studies.campaign.monte_carlo.fly", stumble)
+    (words,) = refusals(verify(copied))
+    assert words.startswith("flights: policy 'no-divert' failed in episode 0 of study seed 0: KeyError")
+
+
 def test_a_changed_preset_is_refused(copied: Path) -> None:
     change_provenance(copied, lambda held: held["preset"]["rules"].update(thrust_error=0.0))
-    assert "preset.rules.thrust_error was 0.0, is 0.05" in refusals(verify(copied))[0]
+    (words,) = refusals(verify(copied))
+    assert "preset.rules.thrust_error was 0.0, is 0.05" in words
+    assert "the study varied the preset, and such a point cannot be verified" in words
 
 
 def test_another_number_of_episodes_is_refused(copied: Path) -> None:

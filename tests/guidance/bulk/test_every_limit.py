@@ -89,7 +89,7 @@ def test_touching_flights_and_those_without_a_coast_are_those_of_single_calls(st
 
 
 def test_the_kink_of_a_touch_bounds_its_neighbours_without_a_search():
-    """Of harsh starts that touch: half are bounded to a decagram of 20 kg, each soundly."""
+    """Of harsh starts that touch: half are bounded to less than 30 g, each soundly."""
     rng, gaps = np.random.default_rng(5), []
     starts = np.array([harsh_start(rng) for _ in range(1500)])
     found = solve_pdg_many(starts, TARGET, fallback=False)

@@ -86,7 +86,11 @@ def test_limits_refuse_what_the_indirect_method_refuses():
             assert answer.propellant == pytest.approx(
                 start[6] * -math.expm1(-flight.log_mass_ratio), rel=1e-9
             )
-        left += flight is not None and answer.finding != Finding.OPTIMAL
+        if answer.finding == Finding.INFEASIBLE:
+            assert flight is None
+        left += flight is not None and answer.finding in (Finding.NO_FLIGHT, Finding.BELOW_GROUND)
+        if flight is not None:
+            assert answer.finding in (Finding.OPTIMAL, Finding.NO_FLIGHT, Finding.BELOW_GROUND)
         if answer.finding in OF_LIMIT and OF_LIMIT[Finding(answer.finding)] != "altitude":
             freed = replace(problem, lander=replace(lander, pointing_limit=None), limits=Limits())
             assert find_extremal_flight(freed) is not None

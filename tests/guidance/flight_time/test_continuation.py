@@ -8,11 +8,12 @@ import guidance
 from guidance import PAPER_LANDER, PlanStatus, State
 from guidance.descent.problem import LandingProblem
 from guidance.flight_time.continuation import (
+    _set_lowest,
     raise_touch,
     solve_from_impulses,
     solve_touching_from_edge,
 )
-from guidance.flight_time.extremal import Extremal, blank_extremal, fly_extremal
+from guidance.flight_time.extremal import Burn, Extremal, add_burn, blank_extremal, fly_extremal
 from guidance.flight_time.path_limits import burnt_share
 from guidance.flight_time.primer_equations import TOUCHING, solve_primer, solve_touching
 from guidance.flight_time.primer_vector import scale_landing
@@ -70,6 +71,26 @@ def test_no_first_guess_touches_the_ground_there_and_lower_starts_lead_to_one_th
     assert not solve_touching(scaled(start), x)
     assert solve_touching_from_edge(scaled(start), x)
     assert x.touch[1] > 0.0
+
+
+@pytest.mark.parametrize("start", FROM_BELOW)
+def test_the_lowest_altitude_of_a_first_burn_is_that_of_the_burn_sampled_finely(start):
+    problem, x = scaled(start), blank_extremal()
+    assert solve_primer(problem, x)
+    assert _set_lowest(problem, x)
+    time, lowest = x.touch[0], x.touch[2]
+    state, mass, step = np.hstack([problem.position, problem.velocity]), 1.0, x.times[0] / 1000
+    heights = [state[2]]
+    x.touch[:] = -np.inf, 0.0, 0.0
+    for k in range(1000):
+        state[:3] += step * state[3:] + 0.5 * step**2 * problem.gravity
+        state[3:] += step * problem.gravity
+        add_burn(x, Burn(k * step, (k + 1) * step, mass), problem.mass_flow, (k + 1) * step, state)
+        mass -= problem.mass_flow * step
+        heights.append(state[2])
+    assert lowest < 0.0
+    assert lowest == pytest.approx(min(heights), rel=5e-3)  # the acceleration changes within a part
+    assert time == pytest.approx(step * int(np.argmin(heights)), abs=x.times[0] / 200)
 
 
 @pytest.mark.parametrize("start", FROM_BELOW)

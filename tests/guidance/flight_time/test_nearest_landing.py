@@ -13,6 +13,7 @@ from guidance.flight_time.extremal import touches
 from guidance.flight_time.nearest_landing import ERROR_SHARE, ERROR_SLACK, find_nearest_landing
 from guidance.flight_time.path_limits import KEPT, PROPELLANT
 from guidance.flight_time.primer_vector import find_extremal_flight
+from guidance.planning.indirect_planner import TANK_ALL_BUT_EMPTY, plan_nearest_indirect
 
 MESH = 0.01  # [m] of landing error that a mesh may save where it does not cut through the ground
 
@@ -36,7 +37,7 @@ def nearest_landings(seed, count):
 
 
 def test_it_lands_within_the_tank_and_the_primer_points_at_the_target():
-    found, touching = nearest_landings(71, 300), 0
+    found, touching, costly = nearest_landings(71, 300), 0, 0
     assert len(found) > 25
     for problem, nearest in found:
         flight, miss = nearest.flight, nearest.problem.target - problem.target
@@ -49,7 +50,15 @@ def test_it_lands_within_the_tank_and_the_primer_points_at_the_target():
         slope = flight.extremal.primer[0, :2] - flight.extremal.primer[1, :2]
         assert slope @ miss[:2] == pytest.approx(-np.linalg.norm(slope) * error, rel=1e-9)
         touching += touches(flight.extremal)
+        left = 1.0 - flight.log_mass_ratio / problem.log_mass_ratio
+        assert (left > 1e-6) == nearest.cheapest
+        if not nearest.cheapest:
+            costly += 1
+            plan = plan_nearest_indirect(problem, 31, nearest)
+            assert plan.status is PlanStatus.NEAREST
+            assert plan.message.endswith(TANK_ALL_BUT_EMPTY)
     assert touching > 0
+    assert 0 < costly < 5  # of about fifty
 
 
 def test_nothing_nearer_is_affordable():
@@ -96,6 +105,7 @@ def test_the_convex_problem_lands_no_nearer():
         other = solve_pdg(start, TARGET, unreachable="nearest", throw=False, method="convex")
         assert plan.keeps_limits
         assert plan.position[-1, 2] == pytest.approx(TARGET[2], abs=1e-6)
+        assert plan.message == "nearest" or plan.message.endswith(TANK_ALL_BUT_EMPTY)
         if other.residuals.altitude < 1e-3:
             compared += 1
             assert plan.landing_error < other.landing_error + MESH + ERROR_SHARE * other.landing_error

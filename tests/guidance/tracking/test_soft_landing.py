@@ -164,8 +164,17 @@ def test_a_timed_landing_takes_the_time_asked_and_costs_no_less(later: int) -> N
     assert landing.plan.propellant > best.plan.propellant + 0.1 or later == 0
 
 
-@pytest.mark.parametrize("periods", [3, 12])
-def test_a_landing_sooner_than_the_engine_allows_is_none(periods: int) -> None:
+@pytest.mark.parametrize("periods", [12, 30])
+def test_a_landing_sooner_than_the_engine_allows_is_infeasible(periods: int) -> None:
     landing = plan_timed_landing(starts(1)[0], SITE, PAPER_LANDER, (PERIOD, periods))
+    assert landing.status is PlanStatus.INFEASIBLE
+    assert landing.reference is None
+    assert landing.plan is not None
+    assert landing.plan.status is PlanStatus.INFEASIBLE
+
+
+def test_a_landing_with_no_time_before_its_gate_is_not_planned() -> None:
+    landing = plan_timed_landing(starts(1)[0], SITE, PAPER_LANDER, (PERIOD, 3))
     assert landing.status is PlanStatus.LIMIT_REACHED
     assert landing.reference is None
+    assert landing.plan is None

@@ -1,10 +1,15 @@
 """The deferred-decision policy: its candidates, when it commits, and that it lands."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from hda.flight.episode import begin_flight, fly, observe
+from hda.policies.beliefs.surroundings import infer_unseen
 from hda.policies.deferred_decision import Candidates, DeferredDecisionOptions, DeferredDecisionPolicy
+from hda.policies.hazard_aware import fuse_look, landing_spread
+from hda.policies.landing_dispersion import landing_probability
 from hda.task.scenario import sample_scenario
 
 
@@ -42,3 +47,28 @@ def test_without_a_budget_or_another_candidate_there_is_nothing_to_defer():
         policy = DeferredDecisionPolicy(options=options)
         _, after = policy.decide(observation, policy.begin(scenario.view, np.random.default_rng(0)))
         assert after.committed
+
+
+def test_a_site_committed_to_is_left_where_the_filter_scatters_the_landing_over_a_hazard():
+    scenario = sample_scenario("paper", 5, 1, "tuning")
+    policy, look = DeferredDecisionPolicy(), observe(scenario, begin_flight(scenario))
+    belief = fuse_look(look, scenario.view, None)
+    safe = infer_unseen(belief.probability(), belief.seen)
+    n = belief.side
+    sharp, vague = (replace(look, covariance=sigma**2 * np.eye(6)) for sigma in (0.0, 0.9))
+    bound, cells = policy.options.keep_probability, [(row, column) for row in range(n) for column in range(n)]
+    row, column = next(
+        cell
+        for cell in cells
+        if landing_probability(safe, landing_spread(sharp, policy.options.dispersion), cell) >= bound
+        and landing_probability(safe, landing_spread(vague, policy.options.dispersion), cell) < 0.8 * bound
+    )
+    site = belief.site(row, column, float(look.target[2]))
+    begun = policy.begin(scenario.view, np.random.default_rng(0))
+    memory = replace(begun, belief=belief, committed=True)
+    blank = np.zeros_like(look.safety_map)  # it shows nothing new
+    kept, left = (
+        policy.decide(replace(one, target=site, safety_map=blank), memory)[0].site for one in (sharp, vague)
+    )
+    np.testing.assert_array_equal(kept, site)
+    assert np.linalg.norm(left - site) >= 1.0

@@ -7,6 +7,7 @@ import pytest
 
 from guidance.state import State
 from guidance.tracking.reference import TrackingReference
+from guidance.tracking.soft_landing import SoftLandingOptions
 from guidance.zem_zev import time_to_go
 from hda.flight.episode import begin_flight, fly, observe
 from hda.flight.vehicle import ControlPeriods, FlightErrors, FlightStatus, Segment, Surroundings, fly_over
@@ -88,9 +89,10 @@ def test_it_bears_an_engine_at_either_end_of_its_bound(bound: float, signs: tupl
         assert np.linalg.norm(segment.final_state.position - scenario.nominal_target) < 0.5
 
 
-def test_a_constant_margin_of_a_tenth_does_not() -> None:
-    scenario = scenario_of(0, 0.3)
-    segment = fly_by_engine(PlannedDescent(bears_engine=False), scenario, (-0.3,))
+@pytest.mark.parametrize("margin", [0.1, 0.3])
+def test_a_constant_margin_does_not_be_it_the_bound_itself(margin: float) -> None:
+    scenario, options = scenario_of(0, 0.3), SoftLandingOptions(thrust_margin=margin)
+    segment = fly_by_engine(PlannedDescent(options, bears_engine=False), scenario, (-0.3,))
     assert np.linalg.norm(segment.final_state.velocity) > 5.0
 
 

@@ -1,5 +1,6 @@
 """The landing is put off while no look has brought a map, and only then."""
 
+import math
 from dataclasses import replace
 from itertools import pairwise
 
@@ -14,6 +15,7 @@ from hda.policies.hazard_aware import HazardAwareSite
 from hda.policies.waiting_descent import WaitingDescent
 from hda.policy import PlanCommand
 from hda.sensing.lidar import Lidar
+from hda.site_selection import NominalSite
 from hda.task.presets import find_preset
 from hda.task.random_streams import EpisodeStreams
 from hda.task.scenario import Scenario, sample_scenario
@@ -79,6 +81,31 @@ def test_it_waits_no_longer_than_the_propellant_allows() -> None:
     record = fly_law(scenario, WaitingDescent(reserve=1.0))
     plain = fly_law(scenario, AdjustedDescent())
     np.testing.assert_array_equal(record.segments[-1].path, plain.segments[-1].path)
+
+
+@pytest.mark.parametrize("reserve", [0.2, 0.3, 0.4])
+def test_a_wait_comes_to_the_gate_with_its_reserve_and_one_more_would_not(reserve: float) -> None:
+    paper = find_preset("paper")
+    assert isinstance(paper.lidar, Lidar)
+    sightless, exact = replace(paper.lidar, dropout=1.0), replace(paper.rules, thrust_error=0.0)
+    scenario = sample_scenario(replace(paper, lidar=sightless, rules=exact), 0, 1, "tuning")
+    law = WaitingDescent(reserve=reserve)
+    record = fly(ComposedPolicy("test", NominalSite(), law), scenario)
+    view, options = scenario.view, law.adjusted.planned.options
+    left = [
+        decision.command.reference.duration
+        for decision in record.decisions
+        if isinstance(decision.command, PlanCommand)
+    ]
+    assert len(left) == len(record.decisions)
+    last = max(look for look in range(1, len(left)) if left[look] == left[look - 1])
+    tank = [observation.state.mass - view.lander.dry_mass for observation in record.observations]
+    landed, gravity = record.segments[-1].final_state.mass, float(np.linalg.norm(view.gravity))
+    last_burn = options.terminal_periods * view.control_period * (options.terminal_deceleration + gravity)
+    at_gate = landed * math.exp(last_burn / view.lander.exhaust_velocity) - view.lander.dry_mass
+    assert at_gate >= reserve * tank[last]
+    hovering = landed * gravity * view.decision_interval / view.lander.exhaust_velocity
+    assert at_gate - hovering < reserve * tank[last + 1]  # to fall as much longer costs as much
 
 
 def test_a_wait_that_means_nothing_is_named() -> None:

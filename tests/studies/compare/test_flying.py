@@ -52,6 +52,20 @@ def test_code_of_a_policy_counts_once_it_has_flown(tmp_path: Path, monkeypatch: 
     assert is_compiled(both)  # slow policies are not rehearsed
 
 
+def test_code_of_a_policy_counts_on_the_preset_on_which_it_flew(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("studies.compare.flying.kernel_folder", lambda: tmp_path)
+    paper, lidar = (Study(PRESETS[name], ("no-divert",), 50) for name in ("paper", "lidar"))
+    rehearse(paper, Console())
+    assert is_compiled(paper)
+    assert not is_compiled(lidar)  # paper compiles neither ground nor ranges
+    rehearse(lidar, Console())
+    assert is_compiled(paper)
+    assert is_compiled(lidar)
+    assert (tmp_path / "rehearsed.txt").read_text().splitlines() == ["lidar no-divert", "paper no-divert"]
+
+
 def test_a_policy_that_fails_there_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(registry, "REGISTRY", registry.REGISTRY.copy())
     policy_entry(RAISES)  # as a command line that names it does
