@@ -157,7 +157,7 @@ def test_cards_give_a_score_per_seed(tmp_path):
         scores_of_card(path)
 
 
-SHIPPED = sorted(card for card in WEIGHTS_FOLDER.glob("*.json") if card.stem != "autoencoder")
+SHIPPED = sorted(set(WEIGHTS_FOLDER.glob("*.json")) - set(WEIGHTS_FOLDER.glob("autoencoder*.json")))
 
 
 @pytest.mark.parametrize("card", SHIPPED, ids=lambda card: card.stem)
