@@ -18,6 +18,7 @@ from typing import Any
 
 from hda.ground.library import FORMAT_VERSION, Ground
 from hda.ground.own_terrain import OwnTerrain
+from hda.task.presets import Preset
 from studies.campaign.monte_carlo import Study, chunk_episodes
 
 _PACKAGES = (
@@ -73,6 +74,22 @@ def identify_study(study: Study) -> dict[str, Any]:
         "terrain_format": FORMAT_VERSION,
         **identify_software(study.paths),
     }
+
+
+def restore_study(told: dict[str, Any], preset: Preset) -> Study:
+    """The study of `identify_study`'s field `study`, on a preset.
+
+    Raises:
+        KeyError, TypeError, ValueError: fields are missing or damaged.
+    """
+    return Study(
+        preset,
+        tuple(map(str, told["policies"])),
+        int(told["episodes"]),
+        int(told["study_seed"]),
+        str(told["split"]),
+        tuple(map(str, told["paths"])),
+    )
 
 
 def identify_software(paths: tuple[str, ...] = ()) -> dict[str, Any]:

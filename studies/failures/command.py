@@ -26,7 +26,7 @@ from hda.task.scenario import sample_scenario
 from studies.campaign.command_line import open_folder, resumable
 from studies.campaign.journal import Journal, open_journal
 from studies.campaign.monte_carlo import Study
-from studies.campaign.provenance import describe_run, identify_run, write_provenance
+from studies.campaign.provenance import describe_run, identify_run, restore_study, write_provenance
 from studies.campaign.run_options import KeepingOptions
 from studies.campaign.shards import read_shard, write_durably
 from studies.columns import write_csv
@@ -74,16 +74,7 @@ def read_study(folder: Path) -> tuple[Study, dict[str, list[int]]]:
     path = folder / "shards" / "study.json"
     try:
         held = json.loads(path.read_text())
-        told = held["study"]
-        preset = find_held_preset(held["preset"])
-        study = Study(
-            preset,
-            tuple(told["policies"]),
-            int(told["episodes"]),
-            int(told["study_seed"]),
-            told["split"],
-            tuple(told["paths"]),
-        )
+        study = restore_study(held["study"], find_held_preset(held["preset"]))
     except FileNotFoundError:
         raise ValueError(f"study {folder} holds no study: there is no {path}") from None
     except (KeyError, TypeError, json.JSONDecodeError) as error:

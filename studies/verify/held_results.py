@@ -13,6 +13,7 @@ from hda.flight.episode_row import ROW_COLUMNS, EpisodeRow
 from hda.ground.own_terrain import OWN_SPLIT
 from hda.task.presets import find_preset
 from studies.campaign.monte_carlo import Study
+from studies.campaign.provenance import restore_study
 from studies.compare.table import REFERENCE_POLICY
 
 PROVENANCE = "provenance.json"
@@ -98,15 +99,7 @@ def read_study(provenance: dict[str, Any]) -> Study:
         HeldResultsError: fields are missing, the preset is unknown, or the ground is the user's own.
     """
     try:
-        told = provenance["study"]
-        study = Study(
-            find_preset(str(provenance["preset"]["name"])),
-            tuple(map(str, told["policies"])),
-            int(told["episodes"]),
-            int(told["study_seed"]),
-            str(told["split"]),
-            tuple(map(str, told["paths"])),
-        )
+        study = restore_study(provenance["study"], find_preset(str(provenance["preset"]["name"])))
     except (KeyError, TypeError, ValueError) as error:
         raise HeldResultsError(f"{PROVENANCE} tells no study: {error}") from error
     if study.split == OWN_SPLIT:
