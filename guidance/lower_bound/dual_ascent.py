@@ -19,7 +19,7 @@ import numpy as np
 from guidance.arrays import Array
 from guidance.flight_time.linear_system import dot, solve_linear
 from guidance.kernel import compile_kernel
-from guidance.lower_bound.dual_case import DualCase
+from guidance.lower_bound.dual_case import DualCase, thrust_bounds
 from guidance.lower_bound.dual_function import (
     AFFINE,
     THETA,
@@ -70,27 +70,27 @@ class Ascent(NamedTuple):
 @compile_kernel
 def relax_thrust(primer: Array, time: float, case: DualCase) -> RelaxedThrust:
     """The thrust of the relaxed flight of one duration [s] that a primer leads."""
-    step = time / STEPS
-    whole = step_growth(step, case)
+    step, bounds = time / STEPS, thrust_bounds(case)
+    whole = step_growth(step, bounds)
     directions, switching = np.empty((STEPS + 1, 3)), np.empty(STEPS + 1)
     slopes, weights = np.empty(STEPS), np.zeros(STEPS + 1)
-    here = support(primer, 0.0, case, directions[0])
+    here = support(primer, 0.0, bounds, directions, 0)
     switching[0], spent = here - 1.0, 0.0
     for k in range(STEPS):
-        there = support(primer, step * (k + 1), case, directions[k + 1])
+        there = support(primer, step * (k + 1), bounds, directions, k + 1)
         slopes[k] = (there - here) / step
         s = switching[k]
-        for arc in split_step(s, slopes[k], step, whole, case):
-            weight = case.full if arc.burning else case.least
+        for arc in split_step(s, slopes[k], step, whole, bounds):
+            weight = bounds.full if arc.burning else bounds.least
             spent += weight * (s * arc.growth.first + slopes[k] * arc.growth.second)
             s = s * arc.growth.factor + slopes[k] * arc.growth.first
         switching[k + 1], here = s, there
     adjoint = 0.0
     for k in range(STEPS - 1, -1, -1):
-        first, second = split_step(switching[k], slopes[k], step, whole, case)
+        first, second = split_step(switching[k], slopes[k], step, whole, bounds)
         for arc, begin in ((second, first.duration), (first, 0.0)):
-            weight = case.full if arc.burning else case.least
-            rate = case.full_growth if arc.burning else case.least_growth
+            weight = bounds.full if arc.burning else bounds.least
+            rate = bounds.full_growth if arc.burning else bounds.least_growth
             after = weight + rate * adjoint
             before = weight + rate * (adjoint * arc.growth.factor + weight * arc.growth.first)
             pushed = adjoint * (arc.growth.factor - 1.0) + weight * arc.growth.first

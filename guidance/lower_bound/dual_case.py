@@ -58,6 +58,32 @@ class DualCase(NamedTuple):
     anywhere: bool
 
 
+class ThrustBounds(NamedTuple):
+    """The numbers of a case that inner loops read; with arrays, each call would count their owners.
+
+    Attributes:
+        full: [m/s^2] f, full thrust over start mass.
+        full_growth: [1/s] f kappa.
+        least: [m/s^2] l, least thrust over start mass.
+        least_growth: [1/s] l/c.
+        cosine: of the pointing limit; -1 where there is none.
+        sine: of the pointing limit; 0 where there is none.
+    """
+
+    full: float
+    full_growth: float
+    least: float
+    least_growth: float
+    cosine: float
+    sine: float
+
+
+@compile_kernel
+def thrust_bounds(case: DualCase) -> ThrustBounds:
+    """The bounds on the thrust of a case."""
+    return ThrustBounds(case.full, case.full_growth, case.least, case.least_growth, case.cosine, case.sine)
+
+
 @compile_kernel
 def chord_growth(most: float, exhaust: float) -> float:
     """[s/m] kappa: the chord of the thrust acceleration's growth over the velocity changes up to `most`."""

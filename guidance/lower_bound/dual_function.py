@@ -36,7 +36,7 @@ import numpy as np
 
 from guidance.arrays import Array
 from guidance.kernel import compile_kernel
-from guidance.lower_bound.dual_case import DualCase
+from guidance.lower_bound.dual_case import DualCase, ThrustBounds, thrust_bounds
 
 AFFINE = 6
 """Numbers of a primer (a, b); one with a limit on the path has c and theta besides."""
@@ -97,24 +97,24 @@ def grow(rate: float, time: float) -> Growth:
 
 
 @compile_kernel
-def support(primer: Array, time: float, case: DualCase, direction: Array) -> float:
-    """h(p(tau)), the greatest p.d over the allowed directions; writes the best d, shape (3,)."""
+def support(primer: Array, time: float, bounds: ThrustBounds, directions: Array, row: int) -> float:
+    """h(p(tau)), the greatest p.d over the allowed directions d; writes the best into a row."""
     x, y, z = primer[0] + primer[3] * time, primer[1] + primer[4] * time, primer[2] + primer[5] * time
     if primer.size > AFFINE and time > primer[THETA]:
         late = time - primer[THETA]
         x, y, z = x + primer[6] * late, y + primer[7] * late, z + primer[8] * late
     across = math.sqrt(x * x + y * y)
     size = math.sqrt(across * across + z * z)
-    if z >= size * case.cosine:
+    if z >= size * bounds.cosine:
         scale = 1.0 / max(size, 1e-300)
-        direction[0], direction[1], direction[2] = x * scale, y * scale, z * scale
+        directions[row, 0], directions[row, 1], directions[row, 2] = x * scale, y * scale, z * scale
         return size
     if across > 0.0:
-        direction[0], direction[1] = case.sine * x / across, case.sine * y / across
+        directions[row, 0], directions[row, 1] = bounds.sine * x / across, bounds.sine * y / across
     else:
-        direction[0], direction[1] = case.sine, 0.0
-    direction[2] = case.cosine
-    return case.sine * across + case.cosine * z
+        directions[row, 0], directions[row, 1] = bounds.sine, 0.0
+    directions[row, 2] = bounds.cosine
+    return bounds.sine * across + bounds.cosine * z
 
 
 @compile_kernel
@@ -134,14 +134,14 @@ def linear_part(primer: Array, time: float, case: DualCase) -> float:
 
 
 @compile_kernel
-def step_growth(step: float, case: DualCase) -> StepGrowth:
+def step_growth(step: float, bounds: ThrustBounds) -> StepGrowth:
     """Growth over a step [s]."""
-    return StepGrowth(grow(case.full_growth, step), grow(case.least_growth, step))
+    return StepGrowth(grow(bounds.full_growth, step), grow(bounds.least_growth, step))
 
 
 @compile_kernel
 def split_step(
-    switching: float, slope: float, step: float, whole: StepGrowth, case: DualCase
+    switching: float, slope: float, step: float, whole: StepGrowth, bounds: ThrustBounds
 ) -> tuple[Arc, Arc]:
     """Arcs of one step on which h has a constant slope; the second lasts 0 s where s keeps its sign.
 
@@ -150,10 +150,10 @@ def split_step(
         slope: [1/s] of h.
         step: [s].
         whole: growth over the step.
-        case: the relaxed problem.
+        bounds: on the thrust of the relaxed problem.
     """
     burning = switching > 0.0 or (switching == 0.0 and slope > 0.0)
-    rate = case.full_growth if burning else case.least_growth
+    rate = bounds.full_growth if burning else bounds.least_growth
     growth = whole.burning if burning else whole.coasting
     end = switching * growth.factor + slope * growth.first
     if (end >= 0.0) == burning or end == 0.0:
@@ -161,7 +161,7 @@ def split_step(
     ratio = switching / slope
     until = -ratio if rate * abs(ratio) < 1e-9 else -math.log1p(rate * ratio) / rate
     until = min(max(until, 0.0), step)
-    other = case.least_growth if burning else case.full_growth
+    other = bounds.least_growth if burning else bounds.full_growth
     return Arc(burning, until, grow(rate, until)), Arc(not burning, step - until, grow(other, step - until))
 
 
@@ -177,32 +177,32 @@ def sweep_bound(primer: Array, times: Array, case: DualCase, lowest: Array) -> N
         case: the relaxed problem.
         lowest: [m/s] shape (n,), the answer.
     """
-    direction = np.empty(3)
+    directions, bounds = np.empty((1, 3)), thrust_bounds(case)
     bend, kink = 0.0, 0.0
     for axis in range(3):
         bend -= primer[3 + axis] * case.gravity[axis]
         if primer.size > AFFINE:
             kink -= primer[6 + axis] * case.gravity[axis]
-    here = support(primer, times[0], case, direction)
+    here = support(primer, times[0], bounds, directions, 0)
     switching, spent, before = here - 1.0, 0.0, linear_part(primer, times[0], case)
     last = times[1] - times[0]
-    whole = step_growth(last, case)
+    whole = step_growth(last, bounds)
     for k in range(lowest.size):
         step = times[k + 1] - times[k]
         if abs(step - last) > 1e-12 * step:
-            whole, last = step_growth(step, case), step
-        there = support(primer, times[k + 1], case, direction)
+            whole, last = step_growth(step, bounds), step
+        there = support(primer, times[k + 1], bounds, directions, 0)
         slope = (there - here) / step
         least = switching
-        for arc in split_step(switching, slope, step, whole, case):
+        for arc in split_step(switching, slope, step, whole, bounds):
             growth = arc.growth
-            weight = case.full if arc.burning else case.least
+            weight = bounds.full if arc.burning else bounds.least
             spent += weight * (switching * growth.first + slope * growth.second)
             switching = switching * growth.factor + slope * growth.first
         least = min(least, switching)
         after = linear_part(primer, times[k + 1], case) - spent
         if primer.size > AFFINE and times[k + 1] > primer[THETA]:
             bend, kink = bend + kink, 0.0
-        sag = bend + case.full * max(-slope, 0.0) + case.full * case.full_growth * max(-least, 0.0)
+        sag = bend + bounds.full * max(-slope, 0.0) + bounds.full * bounds.full_growth * max(-least, 0.0)
         lowest[k] = min(before, after) - 0.125 * step * step * max(sag, 0.0)
         before, here = after, there

@@ -18,6 +18,7 @@ from studies.campaign.journal import Journal
 TARGET = (0.0, 0.0, 50.0)
 QUANTILES = (0.5, 0.9, 0.99, 0.999)
 _BATCH = 500
+_FIRST = 500  # starts that are not counted: what their answers need is compiled or assembled on first use
 _SEED = 20260
 _NEW_PROCESS = """
 from time import process_time
@@ -124,7 +125,7 @@ def measure_answers(starts: int, journal: Journal[AnswerBatch]) -> list[AnswerTi
     times: dict[tuple[str, str], list[float]] = defaultdict(list)
     spans = [(kind, first) for kind in KINDS for first in range(0, starts, _BATCH)]
     for kind in KINDS:
-        time_batch(kind, starts, 20)  # what is compiled or assembled on first use is not counted
+        time_batch(kind, starts, _FIRST)
     for kind, first in track(spans, "answers", transient=True):
         count = min(_BATCH, starts - first)
         batch = journal.finish((kind, first, count), lambda k=kind, f=first, c=count: time_batch(k, f, c))

@@ -152,11 +152,12 @@ def study_timing(options: Timing) -> list[Summary]:
         write_provenance(out / "provenance.json", {**describe_run(options), "work": journal.describe()})
     feasible = sum(case.feasible for case in cases)
     title = f"{feasible} feasible and {len(cases) - feasible} infeasible cases"
-    Console(width=max(Console().width, 150)).print(console_table(SUMMARY_COLUMNS, summaries, title))
+    wide = Console(width=max(Console().width, 150))
+    wide.print(console_table(SUMMARY_COLUMNS, summaries, title))
     for sentence in words:
         console.print(f"- {sentence}", markup=False, highlight=False)
     if answer_times:
-        console.print(console_table(ANSWER_COLUMNS, answer_times, "processor time of answers"))
+        wide.print(console_table(ANSWER_COLUMNS, answer_times, "processor time of answers"))
     console.print(f"results in {out}")
     return summaries
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from guidance import PAPER_LANDER, State
 from guidance.descent.problem import LandingProblem
 from guidance.lower_bound.dual_ascent import affine_basis, ascend, dual_value, two_impulse_primer
-from guidance.lower_bound.dual_case import dual_case
+from guidance.lower_bound.dual_case import dual_case, thrust_bounds
 from guidance.lower_bound.dual_function import linear_part, support, sweep_bound
 
 
@@ -90,15 +90,15 @@ def test_the_support_function_is_the_greatest_product_over_the_cone():
             type(PAPER_LANDER)(pointing_limit=limit),
             GRAVITY,
         )
-        case, direction = dual_case(problem, 80.0), np.empty(3)
+        case, direction = dual_case(problem, 80.0), np.empty((1, 3))
         angle = lean * (np.pi if limit is None else limit)
         cone = np.stack([np.sin(angle) * np.cos(turn), np.sin(angle) * np.sin(turn), np.cos(angle)])
         for primer in rng.normal(0.0, 1.0, (20, 6)):
-            value = support(primer, 2.0, case, direction)
+            value = support(primer, 2.0, thrust_bounds(case), direction, 0)
             p = primer[:3] + 2.0 * primer[3:]
             assert value == pytest.approx(np.tensordot(p, cone, 1).max(), abs=2e-4 * float(np.linalg.norm(p)))
-            assert value == pytest.approx(p @ direction, abs=1e-12)
-            assert np.linalg.norm(direction) == pytest.approx(1.0)
+            assert value == pytest.approx(p @ direction[0], abs=1e-12)
+            assert np.linalg.norm(direction[0]) == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize("time", [2.0, 3.0, 5.0])
