@@ -12,6 +12,7 @@ same ground, 128 or 64 rays a side, gridded, and assessed on board; and the flig
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 from guidance.constants import MOON_GRAVITY
 from guidance.lander import PAPER_LANDER, Lander
@@ -77,7 +78,7 @@ class Preset:
         if self.navigation is not None:
             self.navigation.numbers(self.rules.control_period)  # refuses a sensor that no instant can read
 
-    @property
+    @cached_property
     def stance(self) -> Stance | None:
         """The lander's pads and belly where it touches down on real ground; None on the plane."""
         return self.touchdown.stance(self.criteria)
