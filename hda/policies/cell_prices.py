@@ -18,6 +18,9 @@ from hda.policies.landing_dispersion import landing_chance, smooth_across, smoot
 from hda.policies.summed_area import SummedArea, add_two_rows, sum_box
 
 
+_SCOUTS = 8  # cells between two that are priced ahead of the others
+
+
 class Prices(NamedTuple):
     """What the kernel needs of `HazardAwareWeights`."""
 
@@ -150,24 +153,46 @@ def read_part(out: Array, most: float, next_look: NextLook, prices: Prices) -> t
 
 
 @compile_vector_kernel
+def _price_cell(
+    safe: NDArray[np.float32], outlook: Outlook, lattice: Lattice, prices: Prices, row: int, column: int
+) -> float:
+    """J of one cell."""
+    i, s = lattice.point[row], lattice.beyond[row]
+    price = (1.0 - s) * lattice.rows[i, column] + s * lattice.rows[i + 1, column]
+    risk = 1.0 - landing_chance(safe, prices.dispersion, row, column)
+    divert, half_width = _divert_widths(outlook.look, prices, row, column)
+    exponent = sum_box(outlook.known, row, column, divert) / prices.surprise_area
+    exponent += sum_box(outlook.unknown, row, column, half_width) / prices.island_area
+    return price + risk * (prices.divert + prices.failure * math.exp(-exponent))
+
+
+@compile_vector_kernel
 def price_cells(
     safe: NDArray[np.float32],
     outlook: Outlook,
     lattice: Lattice,
     prices: Prices,
-    most: float,
+    bound: tuple[float, float],
     out: Array,
 ) -> None:
-    """Raise to J what is priced at no more than `most` where every failure is averted."""
-    next_look, n = outlook.look, safe.shape[0]
-    for row in range(n):
-        i, s = lattice.point[row], lattice.beyond[row]
-        for column in range(n):
-            if out[row, column] > most:
-                continue
-            price = (1.0 - s) * lattice.rows[i, column] + s * lattice.rows[i + 1, column]
-            risk = 1.0 - landing_chance(safe, prices.dispersion, row, column)
-            divert, half_width = _divert_widths(next_look, prices, row, column)
-            exponent = sum_box(outlook.known, row, column, divert) / prices.surprise_area
-            exponent += sum_box(outlook.unknown, row, column, half_width) / prices.island_area
-            out[row, column] = price + risk * (prices.divert + prices.failure * math.exp(-exponent))
+    """Raise to J what may yet cost no more than the least J and an allowance, the rest not above its J.
+
+    A few cells far apart are priced first: what they find tightens the bound for all.
+
+    Args:
+        safe: shape (n, n).
+        outlook: the next look.
+        lattice: propellant.
+        prices: of the objective.
+        bound: [kg] a price that the least J and the allowance do not exceed together, and the allowance.
+        out: [kg] shape (n, n); on entry J if every failure were averted.
+    """
+    most, within = bound
+    n = safe.shape[0]
+    for step in (_SCOUTS, 1):
+        for row in range(0, n, step):
+            for column in range(0, n, step):
+                if out[row, column] <= most:
+                    price = _price_cell(safe, outlook, lattice, prices, row, column)
+                    out[row, column] = price
+                    most = min(most, price + within)

@@ -147,5 +147,5 @@ def price_sites(
         first, last, widest = read_part(out, most, next_look, prices)
         known, unknown = (SummedArea(np.empty((last - first + 1, widest + 1)), first, n) for _ in range(2))
         sum_by_likelihood(safe, next_look, known, unknown)
-        price_cells(safe, Outlook(next_look, known, unknown), lattice, prices, most, out)
+        price_cells(safe, Outlook(next_look, known, unknown), lattice, prices, (most, within), out)
     return out
