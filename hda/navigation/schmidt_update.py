@@ -54,7 +54,7 @@ def _solve_rows(factor: Array, rows: Array) -> None:
 
 @compile_kernel
 def _design_times(design: Array, table: Array) -> Array:
-    """H T by plain loops: equal to the byte on every machine's linear algebra. Most of H is 0 and left out."""
+    """H T by plain loops, equal to the byte on every machine; most of H is 0 and left out."""
     out = np.zeros((design.shape[0], table.shape[1]))
     for a in range(design.shape[0]):
         for k in range(SIZE):

@@ -61,12 +61,12 @@ class EpisodeStreams:
         return entropy
 
     def _words(self, *key: int) -> NDArray[np.uint32]:
-        """The seed of a child stream as SeedSequence puts it together: the entropy filled up, then its key."""
+        """The seed of a child as SeedSequence puts it together: the entropy filled up, then the key."""
         entropy = self._entropy
         return np.array([*entropy, *[0] * (POOL - len(entropy)), *key], dtype=np.uint32)
 
     def _generator(self, *key: int) -> np.random.Generator:
-        sequence = np.random.SeedSequence(self._words(*key))  # half the time that numpy takes over a spawn key
+        sequence = np.random.SeedSequence(self._words(*key))  # a spawn key would take numpy longer
         return np.random.Generator(np.random.PCG64(sequence))
 
     def scenario(self) -> np.random.Generator:
