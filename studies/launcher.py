@@ -52,6 +52,7 @@ GROUPS: dict[str, dict[str, Command]] = {
         "robustness": Command(
             "studies.robustness.command", "Robustness", "one factor after the other is made worse"
         ),
+        "faults": Command("studies.faults", "Faults", "each fault of the navigation sensors"),
         "failures": Command("studies.failures.command", "Failures", "why episodes of a comparison failed"),
         "memory": Command("studies.memory.command", "MemoryStudy", "when memory helps an agent"),
         "stability": Command(

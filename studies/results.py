@@ -71,6 +71,12 @@ RESULTS: dict[str, Result] = {
     "robustness": Result(
         "robustness.md", "studies.robustness --levels 1 --episodes 1000 --policies nearest-safe hazard-aware"
     ),
+    "robustness-navigated": Result(
+        "robustness.md",
+        "studies.robustness --preset navigated --factors navigation --levels 2 --policies single-divert"
+        " nearest-safe nearest-safe+convex hazard-aware deferred-decision --out results/robustness_navigated",
+    ),
+    "faults": Result("robustness.md", "studies.faults"),
     "scale": Result("scale.md", "studies.scale --episodes 1000 10000"),
 }
 """Name -> what is made, the README's first."""

@@ -18,7 +18,9 @@ import numpy as np
 
 from guidance import solve_pdg, solve_pdg_many
 from guidance.validation import finite_number
-from hda.flight.episode import begin_flight, observe
+from hda.flight.episode import advance, begin_flight, observe
+from hda.policy import PrivilegedPolicy
+from hda.registry import make_policy
 from hda.task.scenario import sample_scenario
 from rl.inference.latent import load_encoder
 from rl.training_libraries import TrainingLibrariesError, require_training_libraries
@@ -29,6 +31,7 @@ Result = TypeVar("Result")
 _CALLS = 10  # of work that is too short for one
 _STARTS = 40  # times the starts that are measured, in one call in bulk
 _UPDATE_ROUNDS = 5  # at most: one takes seconds
+_FLIGHTS = 5  # at most: a flight has five or six steps
 _IMPORT = "import time; s = time.process_time(); import {module}; print(time.process_time() - s)"
 
 FREE_TO_FIXED_LIMIT = 2.0
@@ -37,6 +40,10 @@ EXACT_TO_MESH_LIMIT = 0.125
 """Most that `solve_pdg` may cost where the indirect method answers, in solves of the convex method."""
 BULK_LIMIT = 0.5
 """Most that a start of `solve_pdg_many` may cost, in calls of `solve_pdg`."""
+DECISION_LIMIT = 2.0
+"""Most that a decision and the flight on it may cost on `navigated`, in those on `paper`, looks left out."""
+FILTER_LIMIT = 12.0
+"""Most that an interval of flight alone may cost on `navigated`, in those on `paper`: most is the filter."""
 ENCODING_LIMIT = 7.0
 """Most that encoding a look may cost, in looks."""
 UPDATE_LIMIT = 0.93
@@ -100,6 +107,7 @@ def measure_ratios(preset: str = "paper", repeats: int = 15) -> list[SpeedRatio]
     return [
         *_compare_solves(preset, repeats),
         _compare_bulk(preset, repeats),
+        *_compare_steps(min(repeats, _FLIGHTS)),
         _compare_encoding(preset, repeats),
         *_compare_updates(min(repeats, _UPDATE_ROUNDS)),
         _compare_imports(repeats),
@@ -137,6 +145,38 @@ def _compare_bulk(preset: str, repeats: int) -> SpeedRatio:
         bulk.append(_time(partial(solve_pdg_many, *many, **options))[1] / len(many[0]))
         single.append(_time(partial(solve_pdg, state, target, **options))[1])
     return SpeedRatio("a start in bulk", "a single solve", _median(bulk), _median(single), BULK_LIMIT)
+
+
+def _compare_steps(flights: int) -> tuple[SpeedRatio, SpeedRatio]:
+    """Decisions of `hazard-aware` and the flight on them, by the filter's estimate and by the known state."""
+    pairs = [
+        tuple(_time_steps(preset, episode) for preset in ("navigated", "paper"))
+        for episode in range(flights + 1)
+    ]
+    own, known = ([_median([pair[k][part] for pair in pairs]) for part in (0, 1)] for k in (0, 1))
+    return (
+        SpeedRatio(
+            "a decision and 5 s of flight on navigated", "on paper", sum(own), sum(known), DECISION_LIMIT
+        ),
+        SpeedRatio("5 s of flight on navigated", "on paper", own[1], known[1], FILTER_LIMIT),
+    )
+
+
+def _time_steps(preset: str, episode: int) -> tuple[float, float]:
+    """[s] least processor time of a decision and of an interval, means over a flight."""
+    scenario, policy = sample_scenario(preset, 0, episode, "tuning"), make_policy("hazard-aware")
+    assert not isinstance(policy, PrivilegedPolicy)
+    memory, flight = policy.begin(scenario.view, scenario.streams.policy()), begin_flight(scenario)
+    decisions, intervals, ended = [], [], False
+    while not ended:
+        decide = partial(policy.decide, observe(scenario, flight), memory)
+        decision, memory = decide()
+        fly_on = partial(advance, scenario, flight, decision)
+        step = fly_on()
+        decisions.append(min(_time(decide)[1] for _ in range(_CALLS)))
+        intervals.append(_least(fly_on))
+        flight, ended = step.flight, step.outcome is not None
+    return float(np.mean(decisions)), float(np.mean(intervals))
 
 
 def _compare_encoding(preset: str, repeats: int) -> SpeedRatio:

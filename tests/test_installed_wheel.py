@@ -50,6 +50,10 @@ RUNS: dict[str, tuple[list[str], list[str]]] = {
         [*SMALL, "--policies", "single-divert", "hazard-aware", "td3", "td3-lstm", "--out", "compared"],
         ["compared/table.csv", "compared/report.html", "compared/figures/histograms.png"],
     ),
+    "studies.faults": (
+        [*SMALL, "--faults", "velocimeter-lost", "--policies", "no-divert", "--out", "faulty"],
+        ["faulty/table.csv", "faulty/table.md"],
+    ),
     "studies.failures": (["--study", "failing", "--out", "failed"], ["failed/failures.csv"]),
     "studies.looks": (
         [

@@ -14,7 +14,6 @@ from guidance.arrays import Array
 from guidance.dynamics import propagate_into
 from guidance.kernel import compile_kernel
 from hda.flight.ground_contact import Motion, fall_to_ground, hold_over_ground
-from hda.navigation.steering import Sensing
 from hda.safety.touchdown_stance import Footing
 
 FLYING, TOUCHDOWN, TANK_EMPTY = 0, 1, 2
@@ -50,8 +49,8 @@ class FlightConditions(NamedTuple):
         thrust_error: relative error of the applied thrust.
         navigation_error: estimated minus true position [m] and velocity [m/s], shape (6,); a filter changes
             it in place from period to period.
-        footing: the lander over the true ground; None: the flight ends on the plane.
-        sensing: the filter at work, if there is one. What is None compiles to nothing.
+        footing: the lander over the true ground; None: the flight ends on the plane. What is None compiles to
+            nothing.
     """
 
     period: float
@@ -61,7 +60,6 @@ class FlightConditions(NamedTuple):
     thrust_error: float
     navigation_error: Array
     footing: Footing | None = None
-    sensing: Sensing | None = None
 
 
 @compile_kernel

@@ -23,7 +23,7 @@ from hda.flight.held_thrust import (
     fall_freely,
     hold_period,
 )
-from hda.navigation.steering import PlainSensing, name_sensing, sense
+from hda.navigation.steering import PlainSensing, Sensing, name_sensing, sense
 from hda.safety.touchdown_stance import Footing
 
 _LEAST_TELLING = 0.05  # [m/s^2] commanded acceleration under which the engine's error is not estimated
@@ -65,7 +65,6 @@ _PlainConditions = tuple[
     float,
     Array,
     _PlainFooting | None,
-    PlainSensing | None,
 ]
 """`FlightConditions` without names."""
 
@@ -76,6 +75,7 @@ def _fly_zem_zev(
     site: Array,
     command: _ZemZevNumbers,
     conditions: FlightConditions,
+    sensing: Sensing | None,
     log: _Log,
 ) -> tuple[int, int, int]:
     """Fly one interval: (nodes written, status, control periods in which the pointing limit acted)."""
@@ -107,7 +107,7 @@ def _fly_zem_zev(
         time[k + 1] = time[k] + flown
         if status != FLYING:
             return k + 2, status, limited
-        sense(conditions.sensing, (path[k], path[k + 1], flown, k), gravity, conditions.navigation_error)
+        sense(sensing, (path[k], path[k + 1], flown, k), gravity, conditions.navigation_error)
     return periods + 1, FLYING, limited
 
 
@@ -117,6 +117,7 @@ def _fly_plan(
     reference: _Reference,
     feedback: tuple[TrackingGains, float],
     conditions: FlightConditions,
+    sensing: Sensing | None,
     log: _Log,
 ) -> tuple[int, int, int]:
     """Track a reference for one interval; returns as `_fly_zem_zev`.
@@ -155,7 +156,7 @@ def _fly_plan(
         time[k + 1] = time[k] + flown
         if status != FLYING:
             return k + 2, status, limited
-        sense(conditions.sensing, (path[k], path[k + 1], flown, k), gravity, navigation)
+        sense(sensing, (path[k], path[k + 1], flown, k), gravity, navigation)
         estimate = _estimate_error(path[k], path[k + 1], commanded[k], period, gravity, estimate)
     return periods + 1, FLYING, limited
 
@@ -196,7 +197,7 @@ def _name_footing(plain: _PlainFooting | None) -> Footing | None:
 
 @compile_kernel
 def _name_conditions(conditions: _PlainConditions) -> FlightConditions:
-    period, plane, gravity, vehicle, thrust_error, navigation, footing, sensing = conditions
+    period, plane, gravity, vehicle, thrust_error, navigation, footing = conditions
     return FlightConditions(
         period,
         plane,
@@ -205,7 +206,6 @@ def _name_conditions(conditions: _PlainConditions) -> FlightConditions:
         thrust_error,
         navigation,
         _name_footing(footing),
-        name_sensing(sensing),
     )
 
 
@@ -215,11 +215,12 @@ def enter_zem_zev(
     site: Array,
     command: tuple[float, float, float, float],
     conditions: _PlainConditions,
+    sensing: PlainSensing | None,
     log: tuple[Array, Array, Array],
 ) -> tuple[int, int, int]:
     """`_fly_zem_zev` of plain tuples: numba takes them from Python several times as fast as named ones."""
     named = _name_conditions(conditions)
-    return _fly_zem_zev(start, site, _ZemZevNumbers(*command), named, _Log(*log))
+    return _fly_zem_zev(start, site, _ZemZevNumbers(*command), named, name_sensing(sensing), _Log(*log))
 
 
 @compile_kernel
@@ -228,10 +229,12 @@ def enter_plan(
     reference: tuple[Array, Array, Array],
     feedback: tuple[float, float, float],
     conditions: _PlainConditions,
+    sensing: PlainSensing | None,
     log: tuple[Array, Array, Array],
 ) -> tuple[int, int, int]:
     """`_fly_plan` of plain tuples."""
     named = _name_conditions(conditions)
     position_gain, velocity_gain, assumed_error = feedback
     gains = TrackingGains(position_gain, velocity_gain)
-    return _fly_plan(start, _Reference(*reference), (gains, assumed_error), named, _Log(*log))
+    law = _Reference(*reference), (gains, assumed_error)
+    return _fly_plan(start, *law, named, name_sensing(sensing), _Log(*log))

@@ -137,12 +137,12 @@ def fly_over(
     footing = None if ground is None else plain_footing(ground)
     sensing = None if errors.sensing is None else plain_sensing(errors.sensing)
     believed = errors.navigation.copy()
-    conditions = (interval.period, plane, gravity, vehicle, errors.thrust, believed, footing, sensing)
+    conditions = (interval.period, plane, gravity, vehicle, errors.thrust, believed, footing)
     start, log, command = state.as_array(), (time, path, commanded), decision.command
     if isinstance(command, ZemZevCommand):
         rate = command.time_to_go_rate
         asked = (command.position_gain, command.velocity_gain, command.time_to_go, rate)
-        nodes, status, limited = enter_zem_zev(start, decision.site, asked, conditions, log)
+        nodes, status, limited = enter_zem_zev(start, decision.site, asked, conditions, sensing, log)
         time_to_go = command.time_to_go - rate * float(time[nodes - 1])
     else:
         reference = command.reference
@@ -150,7 +150,7 @@ def fly_over(
         parts = (reference.position, reference.velocity, reference.thrust_acceleration)
         position_gain, velocity_gain = command.gains
         feedback = position_gain, velocity_gain, command.assumed_error
-        nodes, status, limited = enter_plan(start, parts, feedback, conditions, log)
+        nodes, status, limited = enter_plan(start, parts, feedback, conditions, sensing, log)
         time_to_go = reference.duration - float(time[nodes - 1])
     return Segment(
         time=time[:nodes],

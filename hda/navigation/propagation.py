@@ -85,27 +85,18 @@ def measure_force(
 
 @compile_kernel
 def _carry_rows(table: Array, gained: Array, moved: Array, time: float, kept: float) -> None:
-    """Replace the rows of `table` by F times it."""
-    size = table.shape[1]
-    for j in range(size):
-        x, y, z = table[TILT, j], table[TILT + 1, j], table[TILT + 2, j]
-        turned_moved = (
-            y * moved[2] - z * moved[1],
-            z * moved[0] - x * moved[2],
-            x * moved[1] - y * moved[0],
-        )
-        turned_gained = (
-            y * gained[2] - z * gained[1],
-            z * gained[0] - x * gained[2],
-            x * gained[1] - y * gained[0],
-        )
-        for axis in range(3):
-            bias = table[ACCELEROMETER_BIAS + axis, j]
-            table[POSITION + axis, j] += (
-                table[VELOCITY + axis, j] * time - 0.5 * bias * time * time + turned_moved[axis]
-            )
-            table[VELOCITY + axis, j] += turned_gained[axis] - bias * time
-            table[ACCELEROMETER_BIAS + axis, j] = kept * bias
+    """Replace the rows of `table` by F times it; whole rows take each step."""
+    for axis in range(3):
+        second, third = (axis + 1) % 3, (axis + 2) % 3
+        tilted, turned = table[TILT + second], table[TILT + third]
+        position, velocity = table[POSITION + axis], table[VELOCITY + axis]
+        bias = table[ACCELEROMETER_BIAS + axis]
+        for j in range(table.shape[1]):
+            by_move = tilted[j] * moved[third] - turned[j] * moved[second]
+            by_gain = tilted[j] * gained[third] - turned[j] * gained[second]
+            position[j] += velocity[j] * time - 0.5 * bias[j] * time * time + by_move
+            velocity[j] += by_gain - bias[j] * time
+            bias[j] = kept * bias[j]
 
 
 @compile_kernel

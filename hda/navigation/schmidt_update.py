@@ -15,7 +15,7 @@ import numpy as np
 
 from guidance.arrays import Array
 from guidance.kernel import compile_kernel
-from hda.navigation.layout import ESTIMATED, FilterMemory
+from hda.navigation.layout import ESTIMATED, SIZE, FilterMemory
 
 _MOST_DOUBTS = 32  # a factor of 2^32: a state that no such doubt opens is not seen at all
 
@@ -35,51 +35,62 @@ def _factor(matrix: Array) -> None:
 
 
 @compile_kernel
-def _solve_forward(factor: Array, vector: Array) -> None:
-    """Replace b by L^-1 b."""
-    for i in range(vector.size):
-        for k in range(i):
-            vector[i] -= factor[i, k] * vector[k]
-        vector[i] /= factor[i, i]
+def _solve_rows(factor: Array, rows: Array) -> None:
+    """Replace B, shape (m, n), by (L L')^-1 B; whole rows take each step."""
+    count = rows.shape[0]
+    for a in range(count):
+        for b in range(a):
+            for j in range(rows.shape[1]):
+                rows[a, j] -= factor[a, b] * rows[b, j]
+        for j in range(rows.shape[1]):
+            rows[a, j] /= factor[a, a]
+    for a in range(count - 1, -1, -1):
+        for b in range(a + 1, count):
+            for j in range(rows.shape[1]):
+                rows[a, j] -= factor[b, a] * rows[b, j]
+        for j in range(rows.shape[1]):
+            rows[a, j] /= factor[a, a]
 
 
 @compile_kernel
-def _solve_backward(factor: Array, vector: Array) -> None:
-    """Replace b by L'^-1 b."""
-    for i in range(vector.size - 1, -1, -1):
-        for k in range(i + 1, vector.size):
-            vector[i] -= factor[k, i] * vector[k]
-        vector[i] /= factor[i, i]
-
-
-@compile_kernel
-def _times_transpose(left: Array, right: Array) -> Array:
-    """A B' by plain loops: equal to the byte on every machine's linear algebra."""
-    out = np.zeros((left.shape[0], right.shape[0]))
-    for i in range(left.shape[0]):
-        for j in range(right.shape[0]):
-            for k in range(left.shape[1]):
-                out[i, j] += left[i, k] * right[j, k]
+def _design_times(design: Array, table: Array) -> Array:
+    """H T by plain loops, equal to the byte on every machine; most of H is 0 and left out."""
+    out = np.zeros((design.shape[0], table.shape[1]))
+    for a in range(design.shape[0]):
+        for k in range(SIZE):
+            weight = design[a, k]
+            if weight != 0.0:
+                for j in range(table.shape[1]):
+                    out[a, j] += weight * table[k, j]
     return out
 
 
 @compile_kernel
-def _joseph(covariance: Array, design: Array, gain: Array, noise: Array) -> None:
-    """Joseph's form in place: first A P, then (A P) A' + K R K', with A = I - K H and rank-one steps."""
-    size, rows = covariance.shape[0], design.shape[0]
-    across = _times_transpose(covariance, design)
+def _joseph(covariance: Array, design: Array, across: Array, gain: Array, noise: Array) -> None:
+    """Joseph's form in place: first A P, then (A P) A' + K R K', with A = I - K H and rank-one steps.
+
+    Args:
+        covariance: shape (20, 20), P.
+        design: shape (m, 20), H.
+        across: shape (m, 20), H P.
+        gain: shape (m, 13), K' without what is considered.
+        noise: shape (m,), diagonal of R.
+    """
+    rows = design.shape[0]
     for i in range(ESTIMATED):
-        for j in range(size):
-            for a in range(rows):
-                covariance[i, j] -= gain[i, a] * across[j, a]
-    half = _times_transpose(covariance, design)
-    for i in range(size):
-        for j in range(ESTIMATED):
-            for a in range(rows):
-                covariance[i, j] -= half[i, a] * gain[j, a]
-                if i < ESTIMATED:
-                    covariance[i, j] += gain[i, a] * noise[a] * gain[j, a]
-    for i in range(size):
+        for a in range(rows):
+            for j in range(SIZE):
+                covariance[i, j] -= gain[a, i] * across[a, j]
+    half = _design_times(design, covariance.T)
+    for i in range(SIZE):
+        for a in range(rows):
+            for j in range(ESTIMATED):
+                covariance[i, j] -= half[a, i] * gain[a, j]
+            if i < ESTIMATED:
+                weight = gain[a, i] * noise[a]
+                for j in range(ESTIMATED):
+                    covariance[i, j] += weight * gain[a, j]
+    for i in range(SIZE):
         for j in range(i):
             mean = 0.5 * (covariance[i, j] + covariance[j, i])
             covariance[i, j] = mean
@@ -103,25 +114,26 @@ def update(memory: FilterMemory, design: Array, innovation: Array, noise: Array,
     """
     mean, covariance, _ = memory
     rows = design.shape[0]
-    across = _times_transpose(covariance, design)
-    factor = _times_transpose(design, across.T)
+    across = _design_times(design, covariance)
+    factor = _design_times(design, across.T)
     for a in range(rows):
         factor[a, a] += noise[a]
     _factor(factor)
-    whitened = innovation.copy()
-    _solve_forward(factor, whitened)
     square = 0.0
+    whitened = innovation.copy()
     for a in range(rows):
+        for b in range(a):
+            whitened[a] -= factor[a, b] * whitened[b]
+        whitened[a] /= factor[a, a]
         square += whitened[a] * whitened[a]
     if not square <= gate:
         return square
-    gain = across[:ESTIMATED].copy()
-    for i in range(ESTIMATED):
-        _solve_forward(factor, gain[i])
-        _solve_backward(factor, gain[i])
-        for a in range(rows):
-            mean[i] += gain[i, a] * innovation[a]
-    _joseph(covariance, design, gain, noise)
+    gain = across[:, :ESTIMATED].copy()
+    _solve_rows(factor, gain)
+    for a in range(rows):
+        for i in range(ESTIMATED):
+            mean[i] += gain[a, i] * innovation[a]
+    _joseph(covariance, design, across, gain, noise)
     return square
 
 

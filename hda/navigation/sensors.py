@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -130,12 +131,14 @@ class Velocimeter:
         for name in ("bias", "plume_height", "plume_noise"):
             finite_number(name, getattr(self, name), at_least=0.0)
 
-    @property
+    @cached_property
     def beams(self) -> Array:
-        """Unit vectors of the beams, shape (3, 3), one a row; the first leans to the east."""
+        """Unit vectors of the beams, shape (3, 3), one a row; the first leans to the east. Read-only."""
         azimuth = np.arange(3) * (2.0 * math.pi / 3.0)
         across, down = math.sin(self.beam_angle), math.cos(self.beam_angle)
-        return np.column_stack([across * np.cos(azimuth), across * np.sin(azimuth), np.full(3, -down)])
+        beams = np.column_stack([across * np.cos(azimuth), across * np.sin(azimuth), np.full(3, -down)])
+        beams.flags.writeable = False
+        return beams
 
 
 @dataclass(frozen=True)

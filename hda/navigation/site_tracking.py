@@ -74,9 +74,14 @@ def choose_site(navigation: NavigationState, offset: ArrayLike) -> NavigationSta
     Raises:
         ValueError: the offset is not three finite numbers.
     """
+    return _close(navigation, move_site(navigation, finite_vector("offset", offset, 3)))
+
+
+def move_site(navigation: NavigationState, offset: Array) -> FilterMemory:
+    """As `choose_site`, for the kernels, which go on changing it."""
     memory = navigation.memory()
-    memory.mean[SITE : SITE + 3] += finite_vector("offset", offset, 3)
-    return _close(navigation, memory)
+    memory.mean[SITE : SITE + 3] += offset
+    return memory
 
 
 def _close(navigation: NavigationState, memory: FilterMemory) -> NavigationState:

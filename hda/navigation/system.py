@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.special import chdtri
@@ -76,11 +77,13 @@ class NavigationSystem:
         if self.patience < 1:
             raise ValueError(f"patience must be at least 1, got {self.patience}")
 
-    @property
+    @cached_property
     def gates(self) -> Array:
-        """Greatest squared innovation that each sensor's gate lets through, shape (4,)."""
+        """Greatest squared innovation that each sensor's gate lets through, shape (4,); read-only."""
         freedom = np.array([1.0, 3.0, 3.0, 3.0])  # ALTIMETER, VELOCIMETER, TERRAIN_FIX, SITE_FIX
-        return np.array(chdtri(freedom, self.false_rejections))
+        gates = np.array(chdtri(freedom, self.false_rejections))
+        gates.flags.writeable = False
+        return gates
 
     def numbers(self, period: float) -> FilterNumbers:
         """The system for the kernels of a vehicle that steers each `period` [s].

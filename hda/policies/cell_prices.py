@@ -100,8 +100,12 @@ def price_blindly(
     prices: Prices,
     share: float,
     out: Array,
-) -> float:
-    """Fill J as if no later look, or each with a share of the failures left, helped; the least J without."""
+) -> int:
+    """Fill J as if no later look, or each with a share of the failures left, helped.
+
+    Returns:
+        The column of the least J without any help.
+    """
     n = safe.shape[0]
     least = np.empty(n)
     for column in range(n):
@@ -124,7 +128,7 @@ def price_blindly(
             price, risk = (1.0 - s) * south[column] + s * north[column], 1.0 - chance[column]
             priced[column] = price + risk * averted
             least[column] = min(least[column], price + risk * all_failures)
-    return least.min()
+    return int(least.argmin())
 
 
 @compile_vector_kernel
@@ -150,24 +154,82 @@ def read_part(out: Array, most: float, next_look: NextLook, prices: Prices) -> t
 
 
 @compile_vector_kernel
+def _weigh(
+    safe: NDArray[np.float32],
+    lattice: Lattice,
+    prices: Prices,
+    cell: tuple[int, int],
+    ground: tuple[float, float],
+) -> float:
+    """J of one cell with so much known and unknown safe ground [m^2] in reach."""
+    row, column = cell
+    i, s = lattice.point[row], lattice.beyond[row]
+    price = (1.0 - s) * lattice.rows[i, column] + s * lattice.rows[i + 1, column]
+    risk = 1.0 - landing_chance(safe, prices.dispersion, row, column)
+    exponent = ground[0] / prices.surprise_area
+    exponent += ground[1] / prices.island_area
+    return price + risk * (prices.divert + prices.failure * math.exp(-exponent))
+
+
+@compile_vector_kernel
+def price_best(
+    safe: NDArray[np.float32], next_look: NextLook, lattice: Lattice, prices: Prices, column: int
+) -> float:
+    """J of the cell of a column that is cheapest where no later look helps: a bound on the least J.
+
+    It is summed without integral images, which the bound spares in most rows.
+    """
+    n, least, row = safe.shape[0], np.inf, 0
+    for k in range(n):
+        price = _weigh(safe, lattice, prices, (k, column), (0.0, 0.0))
+        if price < least:
+            least, row = price, k
+    divert, half_width = _divert_widths(next_look, prices, row, column)
+    half = int(max(divert, half_width))
+    known, unknown, radius_squared = 0.0, 0.0, next_look.nadir_radius**2
+    for i in range(max(row - half, 0), min(row + half + 1, n)):
+        for j in range(max(column - half, 0), min(column + half + 1, n)):
+            away = max(abs(i - row), abs(j - column))
+            if safe[i, j] > 0.5:
+                known += safe[i, j] if away <= int(divert) else 0.0
+            elif (
+                away <= int(half_width)
+                and (j + 0.5 - next_look.east) ** 2 + (i + 0.5 - next_look.north) ** 2 <= radius_squared
+            ):
+                unknown += safe[i, j]
+    return _weigh(safe, lattice, prices, (row, column), (known, unknown))
+
+
+@compile_vector_kernel
 def price_cells(
     safe: NDArray[np.float32],
     outlook: Outlook,
     lattice: Lattice,
     prices: Prices,
-    most: float,
+    bound: tuple[float, float],
     out: Array,
 ) -> None:
-    """Raise to J what is priced at no more than `most` where every failure is averted."""
-    next_look, n = outlook.look, safe.shape[0]
+    """Raise to J what may yet cost no more than the least J and an allowance, the rest not above its J.
+
+    Each cell that is priced tightens the bound for those after it.
+
+    Args:
+        safe: shape (n, n).
+        outlook: the next look.
+        lattice: propellant.
+        prices: of the objective.
+        bound: [kg] a price that the least J and the allowance do not exceed together, and the allowance.
+        out: [kg] shape (n, n); on entry J if every failure were averted.
+    """
+    most, within = bound
+    look, n = outlook.look, safe.shape[0]
     for row in range(n):
-        i, s = lattice.point[row], lattice.beyond[row]
         for column in range(n):
             if out[row, column] > most:
                 continue
-            price = (1.0 - s) * lattice.rows[i, column] + s * lattice.rows[i + 1, column]
-            risk = 1.0 - landing_chance(safe, prices.dispersion, row, column)
-            divert, half_width = _divert_widths(next_look, prices, row, column)
-            exponent = sum_box(outlook.known, row, column, divert) / prices.surprise_area
-            exponent += sum_box(outlook.unknown, row, column, half_width) / prices.island_area
-            out[row, column] = price + risk * (prices.divert + prices.failure * math.exp(-exponent))
+            divert, half_width = _divert_widths(look, prices, row, column)
+            known = sum_box(outlook.known, row, column, divert)
+            unknown = sum_box(outlook.unknown, row, column, half_width)
+            price = _weigh(safe, lattice, prices, (row, column), (known, unknown))
+            out[row, column] = price
+            most = min(most, price + within)

@@ -21,8 +21,7 @@ from guidance.tracking.soft_landing import SoftLanding, plan_soft_landing, sampl
 from guidance.validation import finite_number
 from hda.policies.adjusted_descent import AdjustedDescent
 from hda.policies.beliefs.belief import GroundBelief
-from hda.policies.beliefs.surroundings import infer_unseen
-from hda.policies.hazard_aware import HazardAwareSite, fuse_look, landing_spread
+from hda.policies.hazard_aware import HazardAwareSite, fuse_look, judge_ground, landing_spread
 from hda.policies.landing_dispersion import landing_probability
 from hda.policies.planned_descent import DescentMemory
 from hda.policies.site_price import HazardAwareWeights
@@ -150,7 +149,7 @@ class DeferredDecisionPolicy:
         height = float(observation.state.position[2] - observation.target[2])
         if height <= 0.0 or (not first and observation.time_to_go <= self.options.commit_time):
             return self._fly_to(observation.target, observation, replace(memory, committed=True))
-        safe = infer_unseen(belief.probability(), belief.seen)
+        safe = judge_ground(belief)
         present = belief.cell(observation.target)
         if memory.committed and present is not None:
             landing = landing_probability(safe, self._spread(observation), present)

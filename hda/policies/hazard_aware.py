@@ -19,6 +19,7 @@ from guidance.lander import Lander
 from guidance.state import State
 from hda.policies.beliefs.belief import GroundBelief, SafetyBelief
 from hda.policies.beliefs.measured_belief import MeasuredBelief
+from hda.policies.beliefs.placement_error import placement_variance
 from hda.policies.beliefs.surroundings import infer_unseen
 from hda.policies.site_price import (
     LATTICE,
@@ -59,10 +60,17 @@ def fuse_look(observation: Observation, view: ScenarioView, belief: GroundBelief
             belief = MeasuredBelief.blank(observation.target, half_side)
         if observation.ground is None:
             return belief
-        return belief.fused(observation.ground, view.criteria, lidar.gridding.percentile)
+        misplaced = placement_variance(observation)
+        return belief.fused(observation.ground, view.criteria, lidar.gridding.percentile, misplaced)
     if not isinstance(belief, SafetyBelief):
         belief = SafetyBelief.blank(observation.target, half_side)
     return belief.fused(observation, lidar)
+
+
+def judge_ground(belief: GroundBelief) -> NDArray[np.float32]:
+    """Shape (n, n), probability that each cell is safe, seen or not, with looks that may be misplaced."""
+    safe = infer_unseen(belief.probability(), belief.seen)
+    return safe if belief.placement is None else belief.placement.blurred(safe)
 
 
 def landing_spread(observation: Observation, control: float) -> float:
@@ -78,8 +86,8 @@ def landing_spread(observation: Observation, control: float) -> float:
     """
     if observation.covariance is None:
         return control
-    east, north = float(observation.covariance[0, 0]), float(observation.covariance[1, 1])
-    return max(control, min(math.sqrt(control**2 + 0.5 * (east + north)), _WIDEST_SPREAD))
+    variance = placement_variance(observation)
+    return max(control, min(math.sqrt(control**2 + variance), _WIDEST_SPREAD))
 
 
 @dataclass(frozen=True)
@@ -101,7 +109,7 @@ class HazardAwareSite:
         self, observation: Observation, view: ScenarioView, belief: GroundBelief, within: float = math.inf
     ) -> Array:
         """[kg] J of every cell of the belief's square, shape (n, n); `within` as in `price_sites`."""
-        safe = infer_unseen(belief.probability(), belief.seen)
+        safe = judge_ground(belief)
         return self.price_by(safe, observation, view, belief, within)
 
     def price_by(
@@ -148,9 +156,12 @@ def load_kernels(*, ranging: bool) -> None:
     state = State(np.array([0.0, 0.0, 100.0]), np.zeros(3), 1200.0)
     reading = np.ones((lidar.pixels, lidar.pixels), dtype=np.float32)
     ground = _level_ground(view) if ranging else None
-    observation = Observation(0, 0.0, state, plane, reading, 16.0, 20.0, ground)
-    belief = fuse_look(observation, view, fuse_look(observation, view, None))
-    HazardAwareSite().price(observation, view, belief)
+    unsure = np.eye(6) if ranging else None  # a filter may come with such a sensor
+    observation = Observation(0, 0.0, state, plane, reading, 16.0, 20.0, ground, covariance=unsure)
+    belief = fuse_look(observation, view, None)
+    if unsure is not None:
+        observation = replace(observation, covariance=0.25 * unsure)
+    HazardAwareSite().price(observation, view, fuse_look(observation, view, belief))
 
 
 def _level_ground(view: ScenarioView) -> MeasuredGround:

@@ -30,6 +30,7 @@ from hda.policies.cell_prices import (
     NextLook,
     Outlook,
     Prices,
+    price_best,
     price_blindly,
     price_cells,
     read_part,
@@ -41,6 +42,7 @@ from hda.task.observation import Observation, ScenarioView
 
 LATTICE = 8
 """[m] spacing at which propellant is estimated; it bends over hundreds of metres."""
+_ROUNDING = 1e-6  # [kg] between a price by integral images and by plain sums
 
 
 @dataclass(frozen=True)
@@ -141,11 +143,11 @@ def price_sites(
         weights.divert_slope,
         dispersion_weights(weights.dispersion),
     )
-    least = price_blindly(safe, lattice, prices, 0.0 if next_look.useful else 1.0, out)
+    column = price_blindly(safe, lattice, prices, 0.0 if next_look.useful else 1.0, out)
     if next_look.useful:
-        most = least + within
+        most = price_best(safe, next_look, lattice, prices, column) + within + _ROUNDING
         first, last, widest = read_part(out, most, next_look, prices)
         known, unknown = (SummedArea(np.empty((last - first + 1, widest + 1)), first, n) for _ in range(2))
         sum_by_likelihood(safe, next_look, known, unknown)
-        price_cells(safe, Outlook(next_look, known, unknown), lattice, prices, most, out)
+        price_cells(safe, Outlook(next_look, known, unknown), lattice, prices, (most, within), out)
     return out

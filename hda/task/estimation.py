@@ -15,7 +15,7 @@ from guidance.arrays import Array
 from guidance.state import State
 from hda.navigation.layout import TrueErrors
 from hda.navigation.navigation_state import NavigationState, begin_navigation
-from hda.navigation.site_tracking import choose_site, find_site, track_site
+from hda.navigation.site_tracking import find_site, move_site, track_site
 from hda.navigation.steering import Sensing
 from hda.task.scenario import Scenario, ground_point
 
@@ -76,18 +76,17 @@ def open_sensing(
         site: [m] shape (3,), the site that was decided on.
         look: number of the look.
     """
-    system, rules = scenario.preset.navigation, scenario.preset.rules
-    if system is None or navigation is None:
+    numbers = scenario.preset.filter_numbers
+    if numbers is None or navigation is None:
         return None
-    moved = choose_site(navigation, site - target)
-    draws = scenario.streams.readings(look, rules.control_periods)
-    errors = moved.errors
+    draws = scenario.streams.readings(look, scenario.preset.rules.control_periods)
+    errors = navigation.errors
     return Sensing(
-        moved.memory(),
+        move_site(navigation, site - target),
         TrueErrors(errors.accelerometer_bias.copy(), errors.altimeter_bias, errors.beam_bias, errors.tilt),
         draws.normal,
         draws.uniform,
-        system.numbers(rules.control_period),
+        numbers,
         scenario.tile.elevation,
         float(scenario.nominal_target[2]) + _ABOVE,
         site.copy(),

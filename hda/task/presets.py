@@ -12,11 +12,13 @@ same ground, 128 or 64 rays a side, gridded, and assessed on board; and the flig
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 from guidance.constants import MOON_GRAVITY
 from guidance.lander import PAPER_LANDER, Lander
 from guidance.validation import finite_number, finite_vector, unknown_name
 from hda.ground.own_terrain import OwnTerrain
+from hda.navigation.layout import FilterNumbers
 from hda.navigation.system import NavigationSystem
 from hda.safety.criteria import SafetyCriteria
 from hda.safety.touchdown_stance import Stance
@@ -75,9 +77,18 @@ class Preset:
         if self.navigation is not None and any(constant):
             raise ValueError("navigation by a filter leaves no constant navigation errors in the rules")
         if self.navigation is not None:
-            self.navigation.numbers(self.rules.control_period)  # refuses a sensor that no instant can read
+            _ = self.filter_numbers  # refuses a sensor that no instant can read
 
-    @property
+    @cached_property
+    def filter_numbers(self) -> FilterNumbers | None:
+        """Sensors and filter for the kernels; None where there is none.
+
+        Raises:
+            ValueError: a sensor is not read at a whole number of control periods.
+        """
+        return None if self.navigation is None else self.navigation.numbers(self.rules.control_period)
+
+    @cached_property
     def stance(self) -> Stance | None:
         """The lander's pads and belly where it touches down on real ground; None on the plane."""
         return self.touchdown.stance(self.criteria)

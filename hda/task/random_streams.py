@@ -60,8 +60,13 @@ class EpisodeStreams:
             entropy += [len(words), *words]
         return entropy
 
+    def _words(self, *key: int) -> NDArray[np.uint32]:
+        """The seed of a child as SeedSequence puts it together: the entropy filled up, then the key."""
+        entropy = self._entropy
+        return np.array([*entropy, *[0] * (POOL - len(entropy)), *key], dtype=np.uint32)
+
     def _generator(self, *key: int) -> np.random.Generator:
-        sequence = np.random.SeedSequence(self._entropy, spawn_key=key)
+        sequence = np.random.SeedSequence(self._words(*key))  # a spawn key would take numpy longer
         return np.random.Generator(np.random.PCG64(sequence))
 
     def scenario(self) -> np.random.Generator:
@@ -109,9 +114,7 @@ class EpisodeStreams:
 @lru_cache(maxsize=32)
 def _draw_look(streams: EpisodeStreams, index: int, pixels: int) -> NDArray[np.float32]:
     """Kept for the other policies that fly the episode."""
-    entropy = streams._entropy
-    words = [*entropy, *[0] * (POOL - len(entropy)), _SENSOR, index]
-    noise = draw_normals(np.array(words, dtype=np.uint32), (pixels, pixels))
+    noise = draw_normals(streams._words(_SENSOR, index), (pixels, pixels))
     noise.flags.writeable = False
     return noise
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,33 +46,36 @@ class Scenario:
     nominal_target: Array
     left_out: tuple[int, ...] = ()
 
-    @property
+    @cached_property
     def sensor_errors(self) -> SensorErrors | None:
         """What errs for the whole episode in the navigation sensors; None on a preset without a filter."""
         system = self.preset.navigation
         return None if system is None else draw_sensor_errors(system, self.streams.navigation())
 
-    @property
+    @cached_property
     def navigation_error(self) -> Array:
         """Estimated minus true position [m] and velocity [m/s], shape (6,), as far as it is constant.
 
         With a filter it is how far the frame of the policies is off the map, and no velocity: horizontally
         the error of the first estimate, vertically too where heights are measured.
         """
-        errors = self.sensor_errors
-        if errors is not None:
-            vertical = 0.0 if self.preset.stance is None else errors.position[2]
-            return np.array([errors.position[0], errors.position[1], vertical, 0.0, 0.0, 0.0])
-        rules = self.preset.rules
+        errors, rules = self.sensor_errors, self.preset.rules
         sigmas = rules.navigation_position_error, rules.navigation_velocity_error
-        return self.streams.navigation_error(*sigmas) if any(sigmas) else np.zeros(6)
+        found = np.zeros(6)
+        if errors is not None:
+            known = 2 if self.preset.stance is None else 3
+            found[:known] = errors.position[:known]
+        elif any(sigmas):
+            found = self.streams.navigation_error(*sigmas)
+        found.flags.writeable = False
+        return found
 
     @property
     def view(self) -> ScenarioView:
         """What a policy may know of it."""
         return view_of_preset(self.preset, self.nominal_target)
 
-    @property
+    @cached_property
     def footing(self) -> Footing | None:
         """The lander over the true ground; None where flights end on the plane."""
         stance = self.preset.stance

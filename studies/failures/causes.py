@@ -256,6 +256,8 @@ def find_remedies(study: Study, policy: str, record: EpisodeRecord) -> tuple[str
     if rules.navigation_position_error > 0.0 or rules.navigation_velocity_error > 0.0:
         exact = replace(rules, navigation_position_error=0.0, navigation_velocity_error=0.0)
         changes["exact navigation"] = replace(preset, rules=exact)
+    if preset.navigation is not None:
+        changes["exact navigation"] = replace(preset, navigation=None)
     pilot = study.make_policy(policy)
     return tuple(
         name

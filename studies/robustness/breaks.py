@@ -32,6 +32,7 @@ class Break:
         ending: the failure that became more frequent by most.
         more: failures of that kind there, less those at the preset's own value.
         episodes: those that failed there but not at the preset's own value.
+        causes: of the first of these, in words, the most frequent first; empty until they are explained.
     """
 
     factor: str
@@ -44,6 +45,7 @@ class Break:
     ending: str
     more: int
     episodes: tuple[int, ...]
+    causes: str = ""
 
 
 def success_drop(nominal: Sequence[EpisodeRow], level: Sequence[EpisodeRow]) -> Interval:

@@ -1,15 +1,15 @@
 """How policies stand up to what their design did not assume: one factor at a time, on the same episodes.
 
-Each factor is one number of the preset: engine, sensor, ground, navigation, start. At each level every policy
-flies the same episodes; a figure and a table per factor show safe sites, successes and propellant, and
-breaks.md tells which policy breaks first and why: the ending that became more frequent, and the causes that
-`studies.failures` computes for those episodes.
+Each factor is one number of the preset: engine, sensor, ground, navigation, start; with a navigation filter
+also each of its sensors. At each level every policy flies the same episodes; a figure and a table per factor
+show safe sites, successes and propellant, and breaks.md tells which policy breaks first and why: the ending
+that became more frequent, and the causes that `studies.failures` computes for those episodes.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -34,7 +34,8 @@ from studies.campaign.run_options import RunOptions
 from studies.columns import write_csv, write_markdown
 from studies.failures.causes import explain_failure
 from studies.robustness.breaks import Break, find_breaks
-from studies.robustness.factors import FACTORS, Factor, choose_factors
+from studies.robustness.factor import Factor
+from studies.robustness.factors import choose_factors
 from studies.robustness.table import (
     BREAK_COLUMNS,
     LEVEL_COLUMNS,
@@ -54,7 +55,8 @@ class Robustness(RunOptions):
     """Command line of the robustness sweep.
 
     Attributes:
-        factors: names of factors; `all` is every one that the preset has.
+        factors: names of factors; `all` is every one that the preset has, `navigation` every sensor of a
+            navigation filter and what is known at the start.
         episodes: episodes per policy and level.
         levels: levels per factor beside the preset's own value, at most.
         preset: the setting that is varied.
@@ -131,9 +133,13 @@ def run_robustness(options: Robustness) -> list[Sweep]:
         presets = {k: studies[varied[k]].preset if k in varied else own.preset for k in levels}
         hazard = {k: measure_hazard(preset, options.split) for k, preset in presets.items()}
         others = {k: rows for k, rows in levels.items() if k in varied}
-        breaks = find_breaks(factor.name, value, flown[_NOMINAL], others)
+        found = find_breaks(factor.name, value, flown[_NOMINAL], others)
+        breaks = [
+            replace(b, causes=explain_break(b, studies[_label(factor, b.level)]))
+            for b in track(found, f"explaining breaks: {factor.name}", transient=True)
+        ]
         sweeps.append(Sweep(factor, value, levels, hazard, breaks))
-    write_sweeps(out, sweeps, studies, options)
+    write_sweeps(out, sweeps, options)
     write_provenance(out / "provenance.json", describe_run(options))
     return sweeps
 
@@ -148,9 +154,7 @@ def explain_break(found: Break, study: Study) -> str:
     return "; ".join(f"{count} x {cause}" for cause, count in causes.most_common())
 
 
-def write_sweeps(
-    out: Path, sweeps: Sequence[Sweep], studies: Mapping[str, Study], options: Robustness
-) -> None:
+def write_sweeps(out: Path, sweeps: Sequence[Sweep], options: Robustness) -> None:
     """Write a table and a figure per factor, and the breaks."""
     for sweep in sweeps:
         write_csv(out / f"{sweep.factor.name}.csv", LEVEL_COLUMNS, list_levels(sweep))
@@ -160,16 +164,13 @@ def write_sweeps(
 
             figure = draw_sweep(sweep.factor.label, sweep.own, sweep.levels)
             figure.savefig(out / f"{sweep.factor.name}.png", dpi=90)
-    found = [(b, studies[_label(FACTORS[b.factor], b.level)]) for sweep in sweeps for b in sweep.breaks]
-    explained = [
-        (b, explain_break(b, study)) for b, study in track(found, "explaining breaks", transient=True)
-    ]
-    write_csv(out / "breaks.csv", BREAK_COLUMNS, explained)
-    write_markdown(out / "breaks.md", BREAK_COLUMNS, explained)
+    breaks = [found for sweep in sweeps for found in sweep.breaks]
+    write_csv(out / "breaks.csv", BREAK_COLUMNS, breaks)
+    write_markdown(out / "breaks.md", BREAK_COLUMNS, breaks)
 
 
 def print_sweeps(sweeps: Sequence[Sweep]) -> None:
-    """Say in words who breaks first along each factor."""
+    """Say in words who breaks first along each factor, and why."""
     console = Console()
     for sweep in sweeps:
         if not sweep.breaks:
@@ -180,7 +181,8 @@ def print_sweeps(sweeps: Sequence[Sweep]) -> None:
         tail = f"; also {', '.join(same)}" if same else ""
         console.print(
             f"{sweep.factor.name}: {first.policy} breaks first, at {first.level:g} ({sweep.factor.label}):"
-            f" success falls by {100.0 * first.drop.estimate:.1f} points, mostly {first.ending}{tail}",
+            f" success falls by {100.0 * first.drop.estimate:.1f} points, mostly {first.ending}"
+            f" ({first.causes}){tail}",
             highlight=False,
             markup=False,
         )

@@ -3,47 +3,28 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 
 from guidance.validation import unknown_name
 from hda.sensing.lidar import Lidar
 from hda.sensing.ranging import RangingLidar
 from hda.task.presets import Preset
-from hda.task.rules import Range
+from hda.task.rules import Range, Rules
 from hda.terrain.generator import TerrainParameters
 from hda.terrain.islands import IslandField
-
-
-@dataclass(frozen=True)
-class Factor:
-    """One number of a preset.
-
-    Attributes:
-        name: lower case, hyphens; also the name of files.
-        label: axis of the figure, with the unit.
-        nominal: gives the preset's own value.
-        levels: values to fly, those of most interest first: the first n make a sweep of n levels.
-        vary: gives the preset with another value.
-        applies: whether a preset has this number.
-    """
-
-    name: str
-    label: str
-    nominal: Callable[[Preset], float]
-    levels: tuple[float, ...]
-    vary: Callable[[Preset, float], Preset]
-    applies: Callable[[Preset], bool] = lambda preset: True
-
-    def chosen(self, preset: Preset, count: int) -> tuple[float, ...]:
-        """The first `count` levels that differ from the preset's own value, rising."""
-        own = self.nominal(preset)
-        others = [level for level in self.levels if not math.isclose(level, own, abs_tol=1e-9)]
-        return tuple(sorted(others[:count]))
+from studies.robustness.factor import Factor
+from studies.robustness.navigation_factors import NAVIGATION_FACTORS
 
 
 def _rules(preset: Preset, **changes: float | int) -> Preset:
     return replace(preset, rules=replace(preset.rules, **changes))
+
+
+def _constant_errors(preset: Preset) -> Rules:
+    if preset.navigation is not None:
+        raise ValueError(f"preset {preset.name!r} has a filter: it has no constant errors to vary")
+    return preset.rules
 
 
 def _lidar(preset: Preset, **changes: float | int) -> Preset:
@@ -200,16 +181,18 @@ FACTORS: dict[str, Factor] = {
         Factor(
             "position-error",
             "error of the estimated position, per axis (1 sigma) [m]",
-            lambda preset: preset.rules.navigation_position_error,
+            lambda preset: _constant_errors(preset).navigation_position_error,
             (5.0, 1.0, 0.0, 2.0, 10.0),
             lambda preset, value: _rules(preset, navigation_position_error=value),
+            lambda preset: preset.navigation is None,
         ),
         Factor(
             "velocity-error",
             "error of the estimated velocity, per axis (1 sigma) [m/s]",
-            lambda preset: preset.rules.navigation_velocity_error,
+            lambda preset: _constant_errors(preset).navigation_velocity_error,
             (0.5, 0.2, 0.0, 0.1, 1.0),
             lambda preset, value: _rules(preset, navigation_velocity_error=value),
+            lambda preset: preset.navigation is None,
         ),
         Factor(
             "altitude",
@@ -236,12 +219,18 @@ FACTORS: dict[str, Factor] = {
                 preset, start=replace(preset.start, mass=_moved(preset.start.mass, value))
             ),
         ),
+        *NAVIGATION_FACTORS,
     )
 }
 
 
+_GROUPS = ("all", "navigation")
+
+
 def choose_factors(wanted: Sequence[str], preset: Preset) -> tuple[Factor, ...]:
-    """Factors of the given names, in the table's order, each once; `all` is every one that the preset has.
+    """Factors of the given names, in the table's order, each once.
+
+    `all` is every one that the preset has, `navigation` every sensor of a filter, and the start.
 
     Raises:
         ValueError: there is no such factor, or none was given.
@@ -249,10 +238,12 @@ def choose_factors(wanted: Sequence[str], preset: Preset) -> tuple[Factor, ...]:
     if not wanted:
         raise ValueError("factors must name at least one factor")
     for name in wanted:
-        if name != "all" and name not in FACTORS:
-            raise ValueError(unknown_name("factor", name, ("all", *FACTORS)))
+        if name not in (*_GROUPS, *FACTORS):
+            raise ValueError(unknown_name("factor", name, (*_GROUPS, *FACTORS)))
     return tuple(
         factor
         for factor in FACTORS.values()
-        if factor.name in wanted or ("all" in wanted and factor.applies(preset))
+        if factor.name in wanted
+        or ("all" in wanted and factor.applies(preset))
+        or ("navigation" in wanted and factor in NAVIGATION_FACTORS)
     )

@@ -12,7 +12,7 @@ from studies.campaign.points import Rows
 from studies.campaign.score import PROPELLANT_COLUMN, RATIO_COLUMNS, Score, scaled, score_rows
 from studies.columns import Column, Output
 from studies.robustness.breaks import Break, success_drop
-from studies.robustness.factors import Factor
+from studies.robustness.factor import Factor
 from studies.statistics.ratios import Interval, wilson_interval
 
 _FAILURES = ("hard-landing", "unsafe-site", "crash", "tank-empty", "timed-out")
@@ -97,28 +97,25 @@ LEVEL_COLUMNS: tuple[Column[LevelRow], ...] = (
 )
 """A factor's file: every level and policy, ratios in percent."""
 
-ExplainedBreak = tuple[Break, str]
-"""A break, and the causes of its failures in words."""
-
-BREAK_COLUMNS: tuple[Column[ExplainedBreak], ...] = (
-    Column("factor", "factor", lambda row: row[0].factor, words=True),
-    Column("side", "side", lambda row: row[0].side, outputs=Output.FILE),
-    Column("step", "step", lambda row: row[0].step, outputs=Output.FILE),
-    Column("policy", "policy", lambda row: row[0].policy, words=True),
-    Column("level", "breaks at", lambda row: row[0].level, form="{:g}".format),
-    Column("success_percent", "success", lambda row: 100.0 * row[0].success, digits=1, unit="%"),
+BREAK_COLUMNS: tuple[Column[Break], ...] = (
+    Column("factor", "factor", lambda row: row.factor, words=True),
+    Column("side", "side", lambda row: row.side, outputs=Output.FILE),
+    Column("step", "step", lambda row: row.step, outputs=Output.FILE),
+    Column("policy", "policy", lambda row: row.policy, words=True),
+    Column("level", "breaks at", lambda row: row.level, form="{:g}".format),
+    Column("success_percent", "success", lambda row: 100.0 * row.success, digits=1, unit="%"),
     Column(
         "drop_points",
         "drop",
-        lambda row: scaled(row[0].drop, 100.0),
+        lambda row: scaled(row.drop, 100.0),
         digits=1,
         unit="points",
         interval=True,
         stem="drop",
     ),
-    Column("ending", "by", lambda row: row[0].ending, words=True),
-    Column("more_failures", "more failures", lambda row: row[0].more, outputs=Output.FILE),
-    Column("causes", "causes", lambda row: row[1], words=True),
+    Column("ending", "by", lambda row: row.ending, words=True),
+    Column("more_failures", "more failures", lambda row: row.more, outputs=Output.FILE),
+    Column("causes", "causes", lambda row: row.causes, words=True),
 )
 """Where policies break; the first to break leads its factor."""
 

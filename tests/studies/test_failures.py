@@ -15,11 +15,11 @@ from hda.flight.record import EpisodeRecord
 from hda.registry import make_policy
 from hda.task.presets import PRESETS, Preset
 from hda.task.rules import Range
-from hda.task.scenario import sample_scenario
+from hda.task.scenario import Scenario, sample_scenario
 from studies.campaign.claimed_folder import FolderError
 from studies.campaign.monte_carlo import Study
 from studies.compare.command import Comparison, compare
-from studies.failures import command
+from studies.failures import causes, command
 from studies.failures.causes import (
     Cause,
     Failure,
@@ -95,6 +95,20 @@ def test_an_engine_that_errs_is_remedied_by_an_exact_one() -> None:
     study = Study(wild, ("nearest-safe",), 12)
     remedies = [find_remedies(study, "nearest-safe", r) for r in failures("nearest-safe", wild, 12)]
     assert any("exact engine" in names for names in remedies)
+
+
+def test_exact_navigation_is_a_remedy_where_a_filter_errs(monkeypatch: pytest.MonkeyPatch) -> None:
+    own, flown = PRESETS["navigated"], []
+    (record,) = failures("no-divert", own, 1)
+
+    def watch(pilot: object, scenario: Scenario) -> EpisodeRecord:
+        flown.append(scenario.preset)
+        return record
+
+    monkeypatch.setattr(causes, "fly", watch)
+    assert find_remedies(Study(own, ("no-divert",), 1), "no-divert", record) == ()
+    assert replace(own, navigation=None) in flown
+    assert own not in flown
 
 
 def test_a_success_has_no_cause() -> None:

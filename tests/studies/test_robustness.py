@@ -14,7 +14,9 @@ from studies.campaign.claimed_folder import FolderError
 from studies.campaign.points import Rows
 from studies.robustness.breaks import find_breaks
 from studies.robustness.command import Robustness, plan_points, run_robustness
-from studies.robustness.factors import FACTORS, Factor
+from studies.robustness.factor import Factor
+from studies.robustness.factors import FACTORS
+from studies.robustness.navigation_factors import NAVIGATION_FACTORS
 
 
 def flat(preset: Preset) -> dict[str, float]:
@@ -41,7 +43,7 @@ def home(factor: Factor) -> Preset:
 @pytest.mark.parametrize("factor", FACTORS.values(), ids=lambda factor: factor.name)
 def test_the_own_value_changes_nothing(factor: Factor, preset: Preset) -> None:
     if not factor.applies(preset):
-        with pytest.raises(ValueError, match="measures"):
+        with pytest.raises(ValueError, match=r"measures|filter"):
             factor.nominal(preset)
         return
     same = flat(factor.vary(preset, factor.nominal(preset)))
@@ -166,6 +168,14 @@ def test_resuming_flies_nothing_and_writes_the_same(swept: tuple[Path, Robustnes
 def test_a_wrong_option_is_named(options: dict, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         plan_points(Robustness(**options))
+
+
+def test_the_sensors_of_a_filter_are_chosen_together() -> None:
+    _, points = plan_points(Robustness(levels=1, preset="navigated", factors=("navigation",)))
+    assert len(points) == 1 + len(NAVIGATION_FACTORS)
+    assert all(point.study.preset.navigation != points[0].study.preset.navigation for point in points[1:])
+    with pytest.raises(ValueError, match="'lidar' has no navigation filter"):
+        plan_points(Robustness(levels=1, preset="lidar", factors=("navigation",)))
 
 
 def test_every_factor_is_planned() -> None:

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from guidance.arrays import Array
 from hda.policies.beliefs.map_readings import CellReadings, fuse_into
+from hda.policies.beliefs.placement_error import Placement
 from hda.sensing.lidar import Lidar
 from hda.task.observation import Observation
 
@@ -78,6 +79,11 @@ class GroundBelief(Protocol):
         """Shape (n, n), whether a cell has been read."""
         ...
 
+    @property
+    def placement(self) -> Placement | None:
+        """By how much its looks may be misplaced; None where no look errs."""
+        ...
+
     def probability(self) -> NDArray[np.float32]:
         """Shape (n, n), probability that each cell is safe, from its own readings alone."""
         ...
@@ -117,6 +123,10 @@ class SafetyBelief:
     def side(self) -> int:
         """Cells along each side."""
         return self.square.side
+
+    @property
+    def placement(self) -> None:
+        """Its looks are taken to lie where they belong: no preset with such looks has a filter."""
 
     @property
     def seen(self) -> NDArray[np.bool_]:

@@ -15,13 +15,15 @@ from numpy.typing import NDArray
 
 from guidance.arrays import Array
 from hda.policies.beliefs.belief import LEVEL_SHARES, LEVELS, CellSquare
+from hda.policies.beliefs.kept_readings import UNREAD, keep_better, look_up
 from hda.policies.beliefs.measured_readings import DENSITY_EDGES, HOLE, PROBABILITY_EDGES, safe_shares
+from hda.policies.beliefs.placement_error import Placement
 from hda.safety.criteria import SafetyCriteria
-from hda.sensing.fusion import fuse_elevations
+from hda.sensing.fusion import fuse_elevations, place_on
 from hda.sensing.gridding import PIXEL_SIZES, ElevationMap
 from hda.sensing.measured_look import MeasuredGround, assess_elevation, find_holes
 
-_UNREAD = -1
+_NOTHING: NDArray[np.float32] = np.empty((0, 0), dtype=np.float32)
 _SCANNED = 0.8  # share of the cells around a site with points, for a hole to be one
 
 
@@ -36,6 +38,7 @@ class MeasuredBelief:
         density_class: shape (n, n), class of the points in a cell of that map.
         probability_class: shape (n, n), class of the reading.
         elevations: the fused map of each size of cells that was seen.
+        placement: by how much the looks may be misplaced; None where no look errs.
     """
 
     square: CellSquare
@@ -43,12 +46,13 @@ class MeasuredBelief:
     density_class: NDArray[np.int8] = field(repr=False)
     probability_class: NDArray[np.int8] = field(repr=False)
     elevations: dict[float, ElevationMap] = field(default_factory=dict, repr=False)
+    placement: Placement | None = None
 
     @classmethod
     def blank(cls, center: Array, half_side: int) -> MeasuredBelief:
         """Nothing seen yet, over the cells within `half_side` [m] of `center` along each axis."""
         square = CellSquare.around(center, half_side)
-        sizes, densities, readings = np.full((3, square.side, square.side), _UNREAD, dtype=np.int8)
+        sizes, densities, readings = np.full((3, square.side, square.side), UNREAD, dtype=np.int8)
         return cls(square, sizes, densities, readings)
 
     @property
@@ -64,10 +68,14 @@ class MeasuredBelief:
     @property
     def seen(self) -> NDArray[np.bool_]:
         """Shape (n, n), whether a cell has a reading."""
-        return self.size_class != _UNREAD
+        return self.size_class != UNREAD
 
     def fused(
-        self, ground: MeasuredGround, criteria: SafetyCriteria, percentile: float | None
+        self,
+        ground: MeasuredGround,
+        criteria: SafetyCriteria,
+        percentile: float | None,
+        misplaced: float = 0.0,
     ) -> MeasuredBelief:
         """The belief after one more look.
 
@@ -75,40 +83,36 @@ class MeasuredBelief:
             ground: what was measured.
             criteria: of the lander.
             percentile: by which heights are gridded.
+            misplaced: [m^2] variance of the look's place along each horizontal axis.
         """
         if 0 in ground.grid.shape:
             return self
-        size = ground.grid.pixel_size
+        size, scan = ground.grid.pixel_size, ground.elevation
         before = self.elevations.get(size)
         if before is not None:
             ground = assess_elevation(fuse_elevations(before, ground.elevation, percentile), criteria)
-        number = PIXEL_SIZES.index(size)
         reading, density = classify_readings(ground, criteria)
         axis = np.arange(self.side, dtype=np.float64) + 0.5
         rows = ground.grid.rows_of(self.corner[1] + axis)
         columns = ground.grid.columns_of(self.corner[0] + axis)
-        i, j = _inside(rows, ground.grid.rows), _inside(columns, ground.grid.columns)
-        there, here = np.ix_(rows[i], columns[j]), np.ix_(i, j)
-        old = self.size_class[here]
-        old_hole = (old != _UNREAD) & (self.probability_class[here] == HOLE)
-        new_hole = reading[there] == HOLE
-        better = (old == _UNREAD) | (number == old) | (old_hole & ~new_hole)
-        better |= (number < old) & (old_hole | ~new_hole)
-        better &= reading[there] != _UNREAD
-        sizes, densities, readings = (
-            layer.copy() for layer in (self.size_class, self.density_class, self.probability_class)
-        )
-        sizes[here] = np.where(better, np.int8(number), old)
-        densities[here] = np.where(better, density[there], densities[here])
-        readings[here] = np.where(better, reading[there], readings[here])
+        kept = self.size_class.copy(), self.density_class.copy(), self.probability_class.copy()
+        placement, places = None, (_NOTHING, _NOTHING)
+        if misplaced > 0.0 or self.placement is not None:
+            newer = place_on(ground.grid, scan).count / np.maximum(ground.elevation.count, 1)
+            before_look = self.placement or Placement.blank(self.side)
+            placement = Placement(before_look.variance.copy(), misplaced)
+            places = newer.astype(np.float32), placement.variance
+        number = np.int8(PIXEL_SIZES.index(size))
+        keep_better((rows, columns), (reading, density, number), kept, places, np.float32(misplaced))
         elevations = self.elevations | {size: ground.elevation}
-        return MeasuredBelief(self.square, sizes, densities, readings, elevations)
+        return MeasuredBelief(self.square, *kept, elevations, placement)
 
     def probability(self) -> NDArray[np.float32]:
         """Shape (n, n), share of safe ground among cells that read as each does; the prior where unread."""
-        prior = float(LEVEL_SHARES[LEVELS.size // 2 :].sum() / LEVEL_SHARES.sum())
-        share = safe_shares()[self.size_class, self.density_class, self.probability_class]
-        return np.where(self.seen, share, np.float32(prior))
+        prior = np.float32(LEVEL_SHARES[LEVELS.size // 2 :].sum() / LEVEL_SHARES.sum())
+        out = np.empty((self.side, self.side), dtype=np.float32)
+        look_up((self.size_class, self.density_class, self.probability_class), safe_shares(), prior, out)
+        return out
 
     def cell(self, site: Array) -> tuple[int, int] | None:
         """(row, column) of the cell under `site`, or None outside the square."""
@@ -117,11 +121,6 @@ class MeasuredBelief:
     def site(self, row: int, column: int, plane: float) -> Array:
         """[m] shape (3,), centre of a cell at the height of the target plane."""
         return self.square.site(row, column, plane)
-
-
-def _inside(places: NDArray[np.int64], count: int) -> NDArray[np.int64]:
-    """Indices of the places that lie in [0, count)."""
-    return np.flatnonzero((places >= 0) & (places < count))
 
 
 def classify_readings(
@@ -140,6 +139,6 @@ def classify_readings(
     points = uniform_filter(count.astype(np.float32), span, mode="constant")
     density = np.searchsorted(DENSITY_EDGES, points / np.maximum(scanned, 1e-6)).astype(np.int8)
     reading = np.searchsorted(PROBABILITY_EDGES, ground.probability).astype(np.int8)
-    reading[~ground.known] = _UNREAD
+    reading[~ground.known] = UNREAD
     reading[find_holes(ground, criteria) & (scanned >= _SCANNED)] = HOLE
     return reading, density

@@ -93,6 +93,31 @@ def test_the_price_is_the_sum_that_the_docstring_states(seed, height, useful):
         assert price[row, column] == pytest.approx(expected, rel=1e-4, abs=1e-3)
 
 
+@settings(max_examples=20)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    height=st.sampled_from([20.0, 120.0, 400.0]),
+    within=st.sampled_from([0.0, 0.05, 3.0]),
+    greatest=st.sampled_from([0.3, 0.98, 1.0]),
+)
+def test_what_cannot_be_cheapest_is_left_out_and_nothing_else(seed, height, within, greatest):
+    """Ground that is nowhere surely safe leaves no cell out by its own price alone."""
+    rng = np.random.default_rng(seed)
+    coarse = rng.uniform(0.0, greatest, (SIDE // 10, SIDE // 10)) ** rng.uniform(0.2, 3.0)
+    safe = np.kron(coarse, np.ones((10, 10))).astype(np.float32)
+    propellant = rng.uniform(0.0, 4.0, FREE.shape)
+    east, north = (float(metres) for metres in rng.uniform(20.0, 100.0, 2))
+    next_look = look_ahead(height, east, north)
+    every = price_sites(safe, propellant, next_look, WEIGHTS)
+    few = price_sites(safe, propellant, next_look, WEIGHTS, within)
+    most = every.min() + within
+    assert best(few) == best(every)
+    np.testing.assert_array_equal(few[every <= most], every[every <= most])
+    rest = every > most
+    assert (few[rest] > most).all()
+    assert (few[rest] <= every[rest]).all()
+
+
 def test_a_dispersed_landing_on_even_ground_is_as_safe_as_the_ground():
     even = np.full((20, 20), 0.7, dtype=np.float32)
     for cell in itertools.product((2, 9, 17), (2, 9, 17)):
@@ -241,7 +266,7 @@ print(ready[0] - before[0], after[0] - ready[0], sorted(after[1] - ready[1]))
 """
 
 
-@pytest.mark.parametrize("preset", ["paper", "lidar"])
+@pytest.mark.parametrize("preset", ["paper", "lidar", "navigated"])
 def test_the_first_decision_waits_for_no_compiled_code(preset: str) -> None:
     answer = subprocess.run(
         [sys.executable, "-c", FIRST_DECISION.replace("PRESET", preset)],
