@@ -56,7 +56,7 @@ class Lidar:
 
 
 @compile_kernel
-def _look_into(
+def look_into(
     position: Array,
     target: Array,
     probability: NDArray[np.float32],
@@ -64,7 +64,10 @@ def _look_into(
     sensor: tuple[float, float, float],
     out: NDArray[np.float32],
 ) -> None:
-    """Fill `out` with the observed map; `sensor` is (width, noise per metre, tan off-nadir limit)."""
+    """Fill `out` with the observed map; arguments as of `look`.
+
+    `sensor` is (width, noise per metre, tan off-nadir limit).
+    """
     width, noise_per_metre, limit = sensor
     rows, columns = probability.shape
     n = out.shape[0]
@@ -111,5 +114,5 @@ def look(
         lidar.noise / lidar.noise_range,
         math.tan(lidar.off_nadir_limit),
     )
-    _look_into(position, target, probability, noise, sensor, out)
+    look_into(position, target, probability, noise, sensor, out)
     return out

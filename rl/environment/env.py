@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Collection
 from dataclasses import fields
 from typing import Any, Generic, TypeVar
 
@@ -27,8 +28,7 @@ from rl.inference.artefacts import ENCODER
 from rl.inference.latent import LATENT_SIZE, encoder_path, load_encoder
 
 ObsType = TypeVar("ObsType")
-_DISPERSION_NAMES = tuple(entry.name for entry in fields(Dispersions))
-_OPTIONS = ("scenario", *_DISPERSION_NAMES)
+DISPERSION_NAMES = tuple(entry.name for entry in fields(Dispersions))
 
 
 class LandingEnv(gymnasium.Env[ObsType, Array32], Generic[ObsType]):
@@ -136,14 +136,13 @@ class LandingEnv(gymnasium.Env[ObsType, Array32], Generic[ObsType]):
         """
         super().reset(seed=seed)
         chosen = dict(options or {})
-        unknown = sorted(set(chosen) - set(_OPTIONS))
-        if unknown:
-            raise ValueError(f"options must be among {', '.join(_OPTIONS)}, got {', '.join(unknown)}")
+        refuse_unknown_options(chosen, ("scenario", *DISPERSION_NAMES))
         if seed is not None or self.study_seed is None:
             self.study_seed = int(self.np_random.integers(2**31)) if seed is None else seed
             self.next_episode = 0
         scenario = chosen.pop("scenario", None)
         if scenario is None:
+            self.source.prepare()
             scenario = self.source.scenario(self.study_seed, self.next_episode, chosen)
             self.next_episode += 1
         elif not isinstance(scenario, Scenario):
@@ -200,6 +199,13 @@ class LandingEnv(gymnasium.Env[ObsType, Array32], Generic[ObsType]):
         self._observation = observe(self.scenario, flight)
         seen = self.encode(self._observation, self.scenario.nominal_target)
         return seen, describe_episode(self.scenario, flight, self.steps)
+
+
+def refuse_unknown_options(options: Collection[str], known: tuple[str, ...]) -> None:
+    """Raise ValueError where an option of `reset` is not known."""
+    unknown = sorted(set(options) - set(known))
+    if unknown:
+        raise ValueError(f"options must be among {', '.join(known)}, got {', '.join(unknown)}")
 
 
 class LunarHDAEnv(LandingEnv[Array32]):
@@ -272,5 +278,10 @@ class LunarHDAMapEnv(LandingEnv[dict[str, Any]]):
         """The flight and the map."""
         return {
             "flight": encode_flight(self.layout, observation, nominal_target),
-            "map": np.round(observation.safety_map[None] * 255.0).astype(np.uint8),
+            "map": map_as_bytes(observation.safety_map)[None],
         }
+
+
+def map_as_bytes(safety_map: Array32) -> NDArray[np.uint8]:
+    """Safety maps times 255, of any shape."""
+    return np.round(safety_map * 255.0).astype(np.uint8)
