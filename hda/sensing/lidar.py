@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from guidance.arrays import Array
-from guidance.kernel import compile_kernel
+from guidance.kernel import compile_vector_kernel
 from guidance.validation import finite_number
 
 
@@ -55,7 +55,7 @@ class Lidar:
         return float(np.linalg.norm(position - target)) * math.tan(self.field_of_view)
 
 
-@compile_kernel
+@compile_vector_kernel
 def look_into(
     position: Array,
     target: Array,
@@ -73,20 +73,30 @@ def look_into(
     n = out.shape[0]
     height = position[2] - target[2]
     reach_squared = (limit * height) ** 2
+    column, across_east = np.empty(n, dtype=np.int64), np.empty(n)
+    begin, end = n, 0
+    for j in range(n):
+        x = target[0] + ((j + 0.5) / n - 0.5) * width
+        column[j] = math.floor(x)
+        dx = x - position[0]
+        across_east[j] = dx * dx
+        if 0 <= column[j] < columns:
+            begin, end = min(begin, j), j + 1
     for i in range(n):
         y = target[1] + ((i + 0.5) / n - 0.5) * width
         row = math.floor(y)
         dy = y - position[1]
+        across_north = dy * dy
         for j in range(n):
-            x = target[0] + ((j + 0.5) / n - 0.5) * width
-            column = math.floor(x)
-            dx = x - position[0]
-            across = dx * dx + dy * dy
-            value = 0.0
-            if across <= reach_squared and 0 <= row < rows and 0 <= column < columns:
-                deviation = noise_per_metre * math.sqrt(across + height * height)
-                value = min(1.0, max(0.0, probability[row, column] + deviation * noise[i, j]))
-            out[i, j] = value
+            out[i, j] = 0.0
+        if not 0 <= row < rows:
+            continue
+        true = probability[row]
+        for j in range(begin, end):
+            across = across_east[j] + across_north
+            deviation = noise_per_metre * math.sqrt(across + height * height)
+            value = min(1.0, max(0.0, true[column[j]] + deviation * noise[i, j]))
+            out[i, j] = value if across <= reach_squared else 0.0
 
 
 def look(

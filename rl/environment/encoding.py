@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from guidance.arrays import Array
+from guidance.kernel import compile_kernel
 from hda.task.observation import Observation
 from rl.inference.arrays import Array32
 
@@ -225,3 +226,18 @@ def encode_observation(
 def clip_latent(latent: Array32) -> Array32:
     """The latent of a map as it stands in the vector, shape (..., 32)."""
     return np.clip(latent, -LATENT_BOUND, LATENT_BOUND)
+
+
+@compile_kernel
+def map_into(safety_map: Array32, out: NDArray[np.uint8]) -> None:
+    """Write a safety map times 255 into `out`, of the same shape."""
+    for i in range(safety_map.shape[0]):
+        for j in range(safety_map.shape[1]):
+            out[i, j] = np.uint8(np.rint(safety_map[i, j] * np.float32(255.0)))
+
+
+def encode_map(safety_map: Array32) -> NDArray[np.uint8]:
+    """A safety map times 255, shape (pixels, pixels)."""
+    out = np.empty(safety_map.shape, np.uint8)
+    map_into(safety_map, out)
+    return out

@@ -20,7 +20,7 @@ from hda.task.presets import Preset, find_preset
 from hda.task.scenario import Scenario
 from rl.environment.action import PAPER_ACTIONS, ActionRanges, decide_action
 from rl.environment.dispersions import Dispersions
-from rl.environment.encoding import CURVED, LATENT_BOUND, LAYOUTS, Layout, encode_flight, encode_observation
+from rl.environment.encoding import CURVED, LATENT_BOUND, LAYOUTS, Layout, encode_flight, encode_map, encode_observation
 from rl.environment.episode_info import describe_episode
 from rl.environment.episode_source import EpisodeSource
 from rl.inference.arrays import Array32
@@ -278,10 +278,5 @@ class LunarHDAMapEnv(LandingEnv[dict[str, Any]]):
         """The flight and the map."""
         return {
             "flight": encode_flight(self.layout, observation, nominal_target),
-            "map": map_as_bytes(observation.safety_map)[None],
+            "map": encode_map(observation.safety_map)[None],
         }
-
-
-def map_as_bytes(safety_map: Array32) -> NDArray[np.uint8]:
-    """Safety maps times 255, of any shape."""
-    return np.round(safety_map * 255.0).astype(np.uint8)

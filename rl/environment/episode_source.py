@@ -34,6 +34,10 @@ class EpisodeSource:
         tile_numbers(self.split, Ground(setting.terrain, setting.criteria))
 
     @cached_property
+    def _setting(self) -> Preset:
+        return self.dispersions.applied(find_preset(self.preset))
+
+    @cached_property
     def _ready(self) -> bool:
         setting = find_preset(self.preset)
         prepare_tiles(Ground(setting.terrain, setting.criteria), self.split)
@@ -45,6 +49,7 @@ class EpisodeSource:
 
     def scenario(self, study_seed: int, episode: int, changes: dict[str, float]) -> Scenario:
         """Draw one; `changes` replace single dispersions."""
-        dispersions = replace(self.dispersions, **changes)
-        setting = dispersions.applied(find_preset(self.preset))
+        setting = self._setting
+        if changes:
+            setting = replace(self.dispersions, **changes).applied(find_preset(self.preset))
         return sample_scenario(setting, study_seed, episode, self.split)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import astuple, dataclass, fields
+from dataclasses import dataclass, fields
 from functools import reduce
 from itertools import pairwise
 
@@ -183,7 +183,8 @@ class FlightBatch:
         self.reward_terms[:, 0] = score_step(1.0, None).propellant * burnt
         for place in np.flatnonzero(self.landed | self.timed_out).tolist():
             outcome = self.outcomes[place] = self._judge(place)
-            self.reward_terms[place] = astuple(score_step(float(burnt[place]), outcome))
+            terms = score_step(float(burnt[place]), outcome)
+            self.reward_terms[place] = [getattr(terms, name) for name in REWARD_TERMS]
 
     def _judge(self, place: int) -> Outcome:
         scenario, state = self.scenarios[place], self.state[place]
@@ -203,26 +204,34 @@ class FlightBatch:
         aims[:, :2] -= self.navigation_error[:, :2]
         return aims
 
-    def look(self, places: Index) -> Array32:
-        """Take the look of this instant of some of the episodes: the maps, shape (m, pixels, pixels)."""
+    def look(self, places: Index, take: Callable[[int, Array32], None]) -> None:
+        """Take the look of this instant of some of the episodes.
+
+        Args:
+            places: shape (m,), which.
+            take: called with k and the map of the k-th, shape (pixels, pixels), which is written over later.
+        """
         lidar = self.settings.preset.lidar
         assert isinstance(lidar, Lidar)
         aims, limit = self.aims(), math.tan(lidar.off_nadir_limit)
         self.width[places] = lengths(self.state[places, :3] - aims[places]) * math.tan(lidar.field_of_view)
         self._look_seed[:, -1] = self.index
-        maps = np.zeros((len(places), lidar.pixels, lidar.pixels), np.float32)
 
         def look_at(first: int, last: int) -> None:
-            for out, place in zip(maps[first:last], places[first:last].tolist(), strict=True):
+            out = np.empty((lidar.pixels, lidar.pixels), np.float32)
+            for k in range(first, last):
+                place = int(places[k])
                 scenario = self.scenarios[place]
                 assert scenario is not None
-                if not self._map_is_missing(scenario, int(self.index[place])):
+                if self._map_is_missing(scenario, int(self.index[place])):
+                    out[:] = 0.0
+                else:
                     sensor = float(self.width[place]), float(self._noise[place]), limit
                     where = self.state[place, :3], aims[place]
                     take_look(self._look_seed[place], *where, scenario.tile.probability, sensor, out)
+                take(k, out)
 
         self.spread(look_at, len(places))
-        return maps
 
     @staticmethod
     def _map_is_missing(scenario: Scenario, index: int) -> bool:

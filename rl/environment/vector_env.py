@@ -11,14 +11,14 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from guidance.arrays import Index
 from hda.task.presets import find_preset
-from rl.environment.encoding import clip_latent, encode_flights
+from rl.environment.encoding import clip_latent, encode_flights, map_into
 from rl.environment.env import (
     DISPERSION_NAMES,
     LandingEnv,
     LunarHDAEnv,
     LunarHDAMapEnv,
-    map_as_bytes,
     refuse_unknown_options,
 )
 from rl.environment.flight_batch import BatchSettings, FlightBatch
@@ -101,8 +101,8 @@ class LandingVectorEnv(VectorEnv[Seen, Array32, Any], Generic[Seen]):
         """The single environment, which says what is flown, what is seen, and what an action means."""
 
     @abstractmethod
-    def encode_maps(self, flights: Array32, maps: Array32) -> Parts:
-        """What is seen, one row for each look, of the encoded flights and the maps."""
+    def look(self, places: Index) -> Parts:
+        """What some of the environments see at this instant, one row for each; `_flights` gives its numbers."""
 
     @abstractmethod
     def present(self, parts: Parts) -> Seen:
@@ -175,16 +175,17 @@ class LandingVectorEnv(VectorEnv[Seen, Array32, Any], Generic[Seen]):
     def _look(self, mask: Mask) -> None:
         """Take the looks of a mask, and keep what they show."""
         places = np.flatnonzero(mask)
-        maps = self.batch.look(places)
-        flights = encode_flights(
-            self.single.layout, self.batch.seen(places), self.batch.nominal_target[places]
-        )
-        parts = self.encode_maps(flights, maps)
+        parts = self.look(places)
         if len(places) == self.num_envs:
             self._seen = parts
         else:
             for key, part in parts.items():
                 self._seen[key][places] = part
+
+    def _flights(self, places: Index) -> Array32:
+        """All that is seen but the maps, shape (m, 12), after the look."""
+        batch = self.batch
+        return encode_flights(self.single.layout, batch.seen(places), batch.nominal_target[places])
 
     def _observation(self) -> Seen:
         """What is seen at present, in arrays of its own."""
@@ -198,17 +199,16 @@ class LunarHDAVectorEnv(LandingVectorEnv[Array32]):
         """One of them."""
         return LunarHDAEnv(**options)
 
-    def encode_maps(self, flights: Array32, maps: Array32) -> Parts:
+    def look(self, places: Index) -> Parts:
         """The 44 numbers of each."""
         assert isinstance(self.single, LunarHDAEnv)
-        encoder, latents = self.single.encoder, np.empty((len(maps), LATENT_SIZE), np.float32)
+        encoder, latents = self.single.encoder, np.empty((len(places), LATENT_SIZE), np.float32)
 
-        def encode(first: int, last: int) -> None:
-            for k in range(first, last):
-                latents[k] = encoder.encode(maps[k])
+        def encode(k: int, safety_map: Array32) -> None:
+            latents[k] = encoder.encode(safety_map)
 
-        self.batch.spread(encode, len(maps))
-        return {"vector": np.concatenate([flights, clip_latent(latents)], axis=1)}
+        self.batch.look(places, encode)
+        return {"vector": np.concatenate([self._flights(places), clip_latent(latents)], axis=1)}
 
     def present(self, parts: Parts) -> Array32:
         """The vectors."""
@@ -225,9 +225,12 @@ class LunarHDAMapVectorEnv(LandingVectorEnv[dict[str, Any]]):
         """One of them."""
         return LunarHDAMapEnv(**options)
 
-    def encode_maps(self, flights: Array32, maps: Array32) -> Parts:
+    def look(self, places: Index) -> Parts:
         """The flight and the map of each."""
-        return {"flight": flights, "map": map_as_bytes(maps)[:, None]}
+        shape = self.single_observation_space["map"].shape
+        maps = np.empty((len(places), *shape), np.uint8)
+        self.batch.look(places, lambda k, safety_map: map_into(safety_map, maps[k, 0]))
+        return {"flight": self._flights(places), "map": maps}
 
     def present(self, parts: Parts) -> dict[str, Any]:
         """The dictionary."""
