@@ -76,9 +76,10 @@ class LandingVectorEnv(VectorEnv[Seen, Array32, Any], Generic[Seen]):
         """
         if options.pop("render_mode", None) is not None:
             raise ValueError("render_mode must be None here: vectorization_mode='sync' draws pictures")
-        mode = AutoresetMode(autoreset_mode)
-        if mode not in _MODES:
-            raise ValueError(f"autoreset_mode must be SAME_STEP or DISABLED, got {mode}")
+        known = {name: mode for mode in _MODES for name in (mode, mode.value)}
+        if autoreset_mode not in known:
+            raise ValueError(f"autoreset_mode must be 'SameStep' or 'Disabled', got {autoreset_mode!r}")
+        mode = known[autoreset_mode]
         self.single = self.make_single(**options)
         setting = find_preset(self.single.source.preset)
         self.batch = FlightBatch(BatchSettings(setting, num_envs, self.single.action_ranges, threads))
