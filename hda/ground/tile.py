@@ -85,8 +85,9 @@ def _hazard_share(safe: NDArray[np.bool_], x: float, y: float, radius: float) ->
             last -= 1
         cells += last - first + 1
         if 0 <= row < rows:
-            for column in range(max(first, 0), min(last + 1, columns)):
-                clear += safe[row, column]
+            within = safe[row, max(first, 0) : max(min(last + 1, columns), 0)]
+            for k in range(within.size):
+                clear += within[k]
     return (cells - clear) / cells
 
 

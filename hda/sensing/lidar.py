@@ -14,9 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from guidance.arrays import Array
+from guidance.arrays import Array, Index
 from guidance.kernel import compile_vector_kernel
 from guidance.validation import finite_number
+
+_LINE = 16  # numbers of a cache line
 
 
 @dataclass(frozen=True)
@@ -56,6 +58,23 @@ class Lidar:
 
 
 @compile_vector_kernel
+def _fetch(probability: NDArray[np.float32], rows: Index, first: int, last: int) -> bool:
+    """Read one number of each cache line that a look needs; false, since no probability is negative.
+
+    The look's own loop waits for one line after another of a map that is not in the cache; here many are on
+    their way at once.
+    """
+    total = np.float32(0.0)
+    for row in rows:
+        if 0 <= row < probability.shape[0]:
+            true = probability[row]
+            for column in range(first, last + 1, _LINE):
+                total += true[column]
+            total += true[last]
+    return total < 0.0
+
+
+@compile_vector_kernel
 def look_into(
     position: Array,
     target: Array,
@@ -73,27 +92,27 @@ def look_into(
     n = out.shape[0]
     height = position[2] - target[2]
     reach_squared = (limit * height) ** 2
-    column, across_east = np.empty(n, dtype=np.int64), np.empty(n)
+    row, column = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
+    across_east, across_north = np.empty(n), np.empty(n)
     begin, end = n, 0
-    for j in range(n):
-        x = target[0] + ((j + 0.5) / n - 0.5) * width
-        column[j] = math.floor(x)
-        dx = x - position[0]
-        across_east[j] = dx * dx
-        if 0 <= column[j] < columns:
-            begin, end = min(begin, j), j + 1
+    for k in range(n):
+        x = target[0] + ((k + 0.5) / n - 0.5) * width
+        y = target[1] + ((k + 0.5) / n - 0.5) * width
+        row[k], column[k] = math.floor(y), math.floor(x)
+        dx, dy = x - position[0], y - position[1]
+        across_east[k], across_north[k] = dx * dx, dy * dy
+        if 0 <= column[k] < columns:
+            begin, end = min(begin, k), k + 1
+    if begin < end and _fetch(probability, row, column[begin], column[end - 1]):
+        return
     for i in range(n):
-        y = target[1] + ((i + 0.5) / n - 0.5) * width
-        row = math.floor(y)
-        dy = y - position[1]
-        across_north = dy * dy
         for j in range(n):
             out[i, j] = 0.0
-        if not 0 <= row < rows:
+        if not 0 <= row[i] < rows:
             continue
-        true = probability[row]
+        true = probability[row[i]]
         for j in range(begin, end):
-            across = across_east[j] + across_north
+            across = across_east[j] + across_north[i]
             deviation = noise_per_metre * math.sqrt(across + height * height)
             value = min(1.0, max(0.0, true[column[j]] + deviation * noise[i, j]))
             out[i, j] = value if across <= reach_squared else 0.0
