@@ -143,14 +143,41 @@ def test_a_loop_in_the_form_of_single_file_learners_runs_and_updates():
     assert all(not torch.equal(a, b) for a, b in zip(before, agent.parameters(), strict=True))
 
 
-def test_the_environments_of_torchrl_see_the_last_observations():
-    reason = "TorchRL is not among the developers' packages; its loops want DISABLED or a dense final_obs"
+@pytest.mark.parametrize("name", IDS)
+def test_torchrl_flies_what_a_vector_without_resets_flies(name):
+    reason = "TorchRL is not among the developers' packages"
     libs = pytest.importorskip("torchrl.envs.libs.gym", reason=reason)
-    vector = gymnasium.make_vec("LunarHDA-v0", num_envs=2)
-    rollout = libs.GymWrapper(vector).rollout(30, break_when_any_done=False)
-    done = rollout["next", "done"].squeeze(-1)
-    assert done.any()
-    assert (rollout["next", "observation"][done].abs().sum(-1) > 0).all()
+    vectors = [gymnasium.make_vec(name, num_envs=2, autoreset_mode="Disabled") for _ in range(2)]
+    env = libs.GymWrapper(vectors[0])
+    env.set_seed(3)
+    rollout = env.rollout(25, break_when_any_done=False)
+    key = "observation" if name == "LunarHDA-v0" else "flight"
+    vectors[1].reset(seed=3)
+    vectors[1].reset()  # TorchRL resets once for the seed and once for the rollout
+    ends = 0
+    for k in range(25):
+        seen, reward, terminated, truncated, _ = vectors[1].step(rollout["action"][:, k].numpy())
+        flown, ended = rollout["next"][:, k], terminated | truncated
+        assert np.array_equal(flown[key].numpy(), seen[key] if isinstance(seen, dict) else seen)
+        assert np.array_equal(flown["reward"].numpy().ravel(), reward.astype(np.float32))
+        assert np.array_equal(flown["done"].numpy().ravel(), ended)
+        ends += int(ended.sum())
+        if ended.any():
+            vectors[1].reset(options={"reset_mask": ended})
+    assert ends > 2
+
+
+def test_a_recorder_of_videos_writes_one_for_an_episode(tmp_path):
+    pytest.importorskip("moviepy", reason="videos need MoviePy: gymnasium[other]")
+    env = wrappers.RecordVideo(
+        gymnasium.make("LunarHDA-Map-v0", render_mode="rgb_array"), str(tmp_path / "videos")
+    )
+    env.reset(seed=0)
+    while not any(env.step(np.zeros(5, np.float32))[2:4]):
+        pass
+    env.close()
+    (video,) = (tmp_path / "videos").glob("*.mp4")
+    assert video.stat().st_size > 10_000
 
 
 def test_a_recorder_of_single_episodes_finds_the_end():
