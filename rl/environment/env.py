@@ -20,7 +20,15 @@ from hda.task.presets import Preset, find_preset
 from hda.task.scenario import Scenario
 from rl.environment.action import PAPER_ACTIONS, ActionRanges, decide_action
 from rl.environment.dispersions import Dispersions
-from rl.environment.encoding import CURVED, LATENT_BOUND, LAYOUTS, Layout, encode_flight, encode_map, encode_observation
+from rl.environment.encoding import (
+    CURVED,
+    LATENT_BOUND,
+    LAYOUTS,
+    Layout,
+    encode_flight,
+    encode_map,
+    encode_observation,
+)
 from rl.environment.episode_info import describe_episode
 from rl.environment.episode_source import EpisodeSource
 from rl.inference.arrays import Array32

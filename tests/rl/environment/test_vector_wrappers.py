@@ -60,7 +60,9 @@ def test_infos_become_lists(name):
 
 def test_wrappers_of_actions_and_rewards_work():
     envs: Any = gymnasium.make_vec("LunarHDA-v0", num_envs=3)
-    envs = vector_wrappers.NormalizeReward(vector_wrappers.ClipReward(vector_wrappers.ClipAction(envs), -1.0, 1.0))
+    envs = vector_wrappers.NormalizeReward(
+        vector_wrappers.ClipReward(vector_wrappers.ClipAction(envs), -1.0, 1.0)
+    )
     plain = gymnasium.make_vec("LunarHDA-v0", num_envs=3)
     assert np.array_equal(envs.reset(seed=0)[0], plain.reset(seed=0)[0])
     wide = np.full((3, 5), 7.0, np.float32)

@@ -80,7 +80,9 @@ class CountEnds(BaseCallback):
 @pytest.mark.parametrize("kind", [TD3, FastTD3])
 def test_td3_remembers_the_transitions_that_were_flown(kind):
     count, rows = 3, 24
-    model = kind("MlpPolicy", adapted(count=count), learning_starts=30, buffer_size=200, batch_size=16, seed=7)
+    model = kind(
+        "MlpPolicy", adapted(count=count), learning_starts=30, buffer_size=200, batch_size=16, seed=7
+    )
     before = [weights.clone() for weights in model.actor.parameters()]
     model.learn(rows * count)
     assert any(not torch.equal(a, b) for a, b in zip(before, model.actor.parameters(), strict=True))
@@ -107,7 +109,9 @@ def test_an_episode_that_is_cut_is_no_end_of_the_task():
     assert buffer.timeouts[:6].all(axis=1).tolist() == [False, False, True] * 2
 
 
-@pytest.mark.parametrize(("name", "policy"), [("LunarHDA-v0", "MlpPolicy"), ("LunarHDA-Map-v0", "MultiInputPolicy")])
+@pytest.mark.parametrize(
+    ("name", "policy"), [("LunarHDA-v0", "MlpPolicy"), ("LunarHDA-Map-v0", "MultiInputPolicy")]
+)
 def test_ppo_learns_and_hears_of_every_end(name, policy):
     counted = CountEnds()
     settings: Any = {"n_steps": 16, "batch_size": 32, "n_epochs": 2, "policy_kwargs": {"log_std_init": -1.5}}
