@@ -66,11 +66,11 @@ def _fetch(probability: NDArray[np.float32], rows: Index, first: int, last: int)
     """
     total = np.float32(0.0)
     for row in rows:
-        if 0 <= row < probability.shape[0]:
-            true = probability[row]
-            for column in range(first, last + 1, _LINE):
-                total += true[column]
-            total += true[last]
+        if 0 <= row < probability.shape[0] and first <= last:
+            line = probability[row]
+            for column in range(first, last, _LINE):
+                total += line[column]
+            total += line[last]
     return total < 0.0
 
 
@@ -92,30 +92,38 @@ def look_into(
     n = out.shape[0]
     height = position[2] - target[2]
     reach_squared = (limit * height) ** 2
-    row, column = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
+    row, column = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.uint64)
     across_east, across_north = np.empty(n), np.empty(n)
-    begin, end = n, 0
+    first, last = columns, -1
     for k in range(n):
         x = target[0] + ((k + 0.5) / n - 0.5) * width
         y = target[1] + ((k + 0.5) / n - 0.5) * width
-        row[k], column[k] = math.floor(y), math.floor(x)
+        place = math.floor(x)
+        inside = 0 <= place < columns
+        row[k], column[k] = math.floor(y), np.uint64(place if inside else 0)
         dx, dy = x - position[0], y - position[1]
-        across_east[k], across_north[k] = dx * dx, dy * dy
-        if 0 <= column[k] < columns:
-            begin, end = min(begin, k), k + 1
-    if begin < end and _fetch(probability, row, column[begin], column[end - 1]):
+        across_east[k], across_north[k] = dx * dx if inside else math.inf, dy * dy
+        if inside:
+            first, last = min(first, place), max(last, place)
+    if _fetch(probability, row, first, last):
         return
+    true = np.empty(n, dtype=np.float32)
     for i in range(n):
-        for j in range(n):
-            out[i, j] = 0.0
+        seen, drawn = out[i], noise[i]
         if not 0 <= row[i] < rows:
+            for j in range(n):
+                seen[j] = 0.0
             continue
-        true = probability[row[i]]
-        for j in range(begin, end):
+        line = probability[row[i]]
+        for j in range(n):
+            true[j] = line[column[j]]
+        for j in range(n):
             across = across_east[j] + across_north[i]
             deviation = noise_per_metre * math.sqrt(across + height * height)
-            value = min(1.0, max(0.0, true[column[j]] + deviation * noise[i, j]))
-            out[i, j] = value if across <= reach_squared else 0.0
+            value = true[j] + deviation * drawn[j]
+            value = value if value > 0.0 else 0.0
+            value = value if value < 1.0 else 1.0
+            seen[j] = value if across <= reach_squared else 0.0
 
 
 def look(

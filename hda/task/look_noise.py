@@ -27,7 +27,8 @@ _LAYERS = 256
 _STEPS = 2.0**23  # of a layer's width
 _LOW = np.uint64(0xFFFFFFFF)
 _UNIT = 2.0**-53
-_U11, _U16, _U32, _U58, _U63, _U64 = (np.uint64(n) for n in (11, 16, 32, 58, 63, 64))
+_LAYER, _SIGN, _CODE = np.uint64(0xFF), np.uint64(0x100), np.uint64(0x7FFFFF)
+_U9, _U11, _U16, _U32, _U58, _U63, _U64 = (np.uint64(n) for n in (9, 11, 16, 32, 58, 63, 64))
 _HASH_SEED, _HASH_FACTOR = np.uint64(0x43B0D7E5), np.uint64(0x931E8875)
 _STATE_SEED, _STATE_FACTOR = np.uint64(0x8B51F9DD), np.uint64(0x58F38DED)
 _MIX_LEFT, _MIX_RIGHT = np.uint64(0xCA01F9DD), np.uint64(0x4973F715)
@@ -143,6 +144,33 @@ def draw_symmetric(seed: Words, bound: float) -> float:
 
 
 @compile_vector_kernel
+def _take_step(bits: np.uint64) -> tuple[np.float32, bool]:
+    """The step in a layer that 32 bits give, and whether it is within the next layer."""
+    layer, code = bits & _LAYER, (bits >> _U9) & _CODE
+    step = np.float32(code) * _STEP_WIDTHS[layer]
+    return -step if bits & _SIGN else step, code < _STEPS_WITHIN[layer]
+
+
+@compile_vector_kernel
+def _fill_within(
+    state: _State, increment: _State, out: NDArray[np.float32], filled: int
+) -> tuple[_State, np.uint64, int]:
+    """Fill from `filled` on by words of which both halves are within their next layers: nine of ten are.
+
+    Returns the state, the first word that is not so, and how much is filled.
+    """
+    while True:
+        state = _advance(state, increment)
+        word = _draw_word(state)
+        first, one = _take_step(word & _LOW)
+        second, other = _take_step(word >> _U32)
+        if filled + 2 > out.size or not (one and other):
+            return state, word, filled
+        out[np.uint64(filled)], out[np.uint64(filled + 1)] = first, second
+        filled += 2
+
+
+@compile_vector_kernel
 def fill_normals(seed: Words, out: NDArray[np.float32]) -> None:
     """Fill a flat array with the first normals of a seed.
 
@@ -156,17 +184,20 @@ def fill_normals(seed: Words, out: NDArray[np.float32]) -> None:
     reach, code = np.float32(0.0), np.uint32(0)
     unit, tail = np.float32(1.0 / 16777216.0), np.float32(_TAIL)
     while filled < out.size:
-        if halves == 0:
+        if halves == 0 and stage == 0:
+            state, word, filled = _fill_within(state, increment, out, filled)
+            halves = 2
+            if filled == out.size:
+                return
+        elif halves == 0:
             state = _advance(state, increment)
             word, halves = _draw_word(state), 2
         bits, word, halves = np.uint32(word & _LOW), word >> _U32, halves - 1
         uniform = np.float32(bits >> np.uint32(8)) * unit
         if stage == 0:  # a layer, a sign and a step in the layer
             layer, code = np.int64(bits & np.uint32(0xFF)), (bits >> np.uint32(9)) & np.uint32(0x7FFFFF)
-            step = np.float32(code) * _STEP_WIDTHS[layer]
-            if bits & np.uint32(0x100):
-                step = -step
-            if code < _STEPS_WITHIN[layer]:
+            step, within = _take_step(np.uint64(bits))
+            if within:
                 out[filled], filled = step, filled + 1
             else:
                 stage = 1 if layer else 2
