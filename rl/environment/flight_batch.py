@@ -1,8 +1,8 @@
 """Many episodes under way at once, as arrays: what `hda.flight.episode` is to one.
 
-The same kernels fly and look, the same functions draw, begin and judge; only the loop over the episodes is
-compiled. It serves worlds of the paper's kind: a look is the true map with noise (Algorithm 2), flights end on
-the target plane, and the lander knows its state but for constant errors.
+The same kernels fly and look, and the same functions draw, begin and judge. It serves worlds of the paper's
+kind: a look is the true map with noise (Algorithm 2), flights end on the target plane, and the lander knows
+its state but for constant errors.
 """
 
 from __future__ import annotations

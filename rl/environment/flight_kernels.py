@@ -1,4 +1,4 @@
-"""Many flights and looks in compiled code: the kernels of `hda.flight` and `hda.sensing`, one after another."""
+"""Many flights, and looks with their noise, by the kernels of `hda.flight` and `hda.sensing`."""
 
 from __future__ import annotations
 

@@ -43,7 +43,7 @@ class LandingVectorEnv(VectorEnv[Seen, Array32, Any], Generic[Seen]):
     observation is the new episode's first, `info` is of the new episode, `info["final_info"]` of the old one,
     and `info["final_obs"]` its last observation, an array of the shape of the observations with zeros in the
     rows that did not end (`info["_final_obs"]` says which did). With `AutoresetMode.DISABLED` nothing begins
-    by itself: `reset(options={"reset_mask": ended})` begins those of a mask, shape (n,), and leaves the others.
+    by itself: `reset(options={"reset_mask": ended})` begins those of a mask, shape (n,).
 
     **Options** of `reset`: `reset_mask`, and every field of `Dispersions` by name, for the episodes that it
     begins.
@@ -103,7 +103,7 @@ class LandingVectorEnv(VectorEnv[Seen, Array32, Any], Generic[Seen]):
 
     @abstractmethod
     def look(self, places: Index) -> Parts:
-        """What some of the environments see at this instant, one row for each; `_flights` gives its numbers."""
+        """What some of the environments see at this instant, one row for each."""
 
     @abstractmethod
     def present(self, parts: Parts) -> Seen:
@@ -228,8 +228,8 @@ class LunarHDAMapVectorEnv(LandingVectorEnv[dict[str, Any]]):
 
     def look(self, places: Index) -> Parts:
         """The flight and the map of each."""
-        shape = self.single_observation_space["map"].shape
-        maps = np.empty((len(places), *shape), np.uint8)
+        pixels = self.batch.settings.preset.lidar.pixels
+        maps = np.empty((len(places), 1, pixels, pixels), np.uint8)
         self.batch.look(places, lambda k, safety_map: map_into(safety_map, maps[k, 0]))
         return {"flight": self._flights(places), "map": maps}
 

@@ -1,4 +1,4 @@
-"""A native vector environment as Stable-Baselines3 wants it: `VecEnv` with the ends that its learners read."""
+"""A native vector environment as Stable-Baselines3 wants it."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ class StableBaselinesVector(VecEnv):
 
 
 def rows_of(info: dict[str, Any], count: int) -> list[dict[str, Any]]:
-    """The `info` of each environment, without masks, of a vector's: plain numbers and dictionaries of such."""
+    """The `info` of each environment, of a vector's: plain numbers, and dictionaries of such."""
     keys = [key for key in info if not key.startswith("_")]
     columns = [
         rows_of(info[key], count) if isinstance(info[key], dict) else info[key].tolist() for key in keys

@@ -83,8 +83,15 @@ def sorted_parts(value: Any) -> Any:
 @pytest.mark.parametrize(("native", "single"), PAIRS)
 @pytest.mark.parametrize(
     ("preset", "count", "steps"),
-    [("paper", 5, 40), ("paper", 1, 20), ("partial", 4, 25), ("hard", 3, 20)]
-    + [(UPRIGHT, 3, 20), (HASTY, 3, 20), (EMPTY, 3, 20)],
+    [
+        ("paper", 5, 40),
+        ("paper", 1, 20),
+        ("partial", 4, 25),
+        ("hard", 3, 20),
+        (UPRIGHT, 3, 20),
+        (HASTY, 3, 20),
+        (EMPTY, 3, 20),
+    ],
     ids=["paper", "one", "partial", "hard", "upright", "hasty", "empty"],
 )
 def test_each_row_is_a_single_environment_to_the_bit(native, single, preset, count, steps):
@@ -200,7 +207,10 @@ def test_an_option_changes_the_episodes_that_the_reset_begins(name, factor):
     expected = alone.reset(options={name: factor})[0]
     for _ in range(2):
         assert all(np.array_equal(changed[key][1], expected[key]) for key in expected)
-        changed, expected = vector.step(np.zeros((2, 5)))[0], alone.step(np.zeros(5, np.float32))[0]
+        changed, expected = (
+            vector.step(np.zeros((2, 5), np.float32))[0],
+            alone.step(np.zeros(5, np.float32))[0],
+        )
     given = LunarHDAMapVectorEnv(2, preset=preset, dispersions=Dispersions(**{name: factor}))
     first = given.reset(seed=3)[0]
     assert same(first, vector.reset(seed=3, options={name: factor})[0])

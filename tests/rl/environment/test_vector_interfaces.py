@@ -1,4 +1,4 @@
-"""What the native vector environments owe to the tools around them: modes, masks, wrappers, specifications."""
+"""What the native vector environments owe to their callers: specifications, ends, masks, messages."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
+from gymnasium.envs.registration import EnvSpec
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 import rl  # noqa: F401 - registers the environments
@@ -48,7 +49,7 @@ def test_make_vec_gives_the_native_vector(name):
     seen, _ = vector.reset(seed=0)
     assert vector.observation_space.contains(seen)
     assert vector.spec is not None
-    again = gymnasium.make_vec(gymnasium.envs.registration.EnvSpec.from_json(vector.spec.to_json()))
+    again = gymnasium.make_vec(EnvSpec.from_json(vector.spec.to_json()))
     assert again.num_envs == 3
     assert same(again.reset(seed=0)[0], seen)
 

@@ -37,7 +37,7 @@ def test_statistics_of_episodes_are_those_of_single_environments(name):
     envs = vector_wrappers.RecordEpisodeStatistics(gymnasium.make_vec(name, num_envs=4))
     envs.reset(seed=9)
     while envs.episode_count < 4:
-        *_, infos = envs.step(np.zeros((4, 5), np.float32))
+        envs.step(np.zeros((4, 5), np.float32))
     expected = returns_and_lengths(name, 8, 9)
     for total, length in zip(envs.return_queue, envs.length_queue, strict=True):
         assert any(total == pytest.approx(other) and length == steps for other, steps in expected)
@@ -73,13 +73,19 @@ def test_wrappers_of_actions_and_rewards_work():
 
 def test_wrappers_of_a_single_environment_keep_its_numbers():
     plain = gymnasium.make("LunarHDA-Map-v0")
+
+    def flatten(seen: Any) -> np.ndarray:
+        flattened = gymnasium.spaces.flatten(plain.observation_space, seen)
+        assert isinstance(flattened, np.ndarray)
+        return flattened
+
     flat = wrappers.FlattenObservation(wrappers.ClipAction(gymnasium.make("LunarHDA-Map-v0")))
     stacked = wrappers.FrameStackObservation(gymnasium.make("LunarHDA-v0"), 3)
     seen, _ = plain.reset(seed=0)
-    assert np.array_equal(flat.reset(seed=0)[0], gymnasium.spaces.flatten(plain.observation_space, seen))
+    assert np.array_equal(flat.reset(seed=0)[0], flatten(seen))
     seen = plain.step(np.ones(5, np.float32))[0]
     other = flat.step(np.full(5, 3.0, np.float32))[0]
-    assert np.array_equal(other, gymnasium.spaces.flatten(plain.observation_space, seen))
+    assert np.array_equal(other, flatten(seen))
     assert stacked.reset(seed=0)[0].shape == (3, 44)
 
 

@@ -47,7 +47,8 @@ def test_it_gives_what_the_vector_of_stable_baselines_gives(name, kind):
     ours = adapted(name, count, **limit)
     theirs = DummyVecEnv([lambda k=k: Lane(kind(), 5, k, count) for k in range(count)])
     ours.seed(5)
-    assert same(ours.reset(), dict(theirs.reset()) if name == "LunarHDA-Map-v0" else theirs.reset())
+    seen, expected = ours.reset(), theirs.reset()
+    assert same(seen, dict(expected) if isinstance(expected, dict) else expected)
     rng, ends = np.random.default_rng(0), 0
     for _ in range(20):
         action = rng.uniform(-1.0, 1.0, (count, 5)).astype(np.float32)
