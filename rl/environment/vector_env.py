@@ -74,6 +74,7 @@ class LandingVectorEnv(VectorEnv[Seen, Array32, Any], Generic[Seen]):
             ValueError: a wrong number or mode, a preset that a batch does not serve, a render mode, or as of
                 the single environment.
         """
+        self.closed = True  # until there is something to close
         if options.pop("render_mode", None) is not None:
             raise ValueError("render_mode must be None here: vectorization_mode='sync' draws pictures")
         known = {name: mode for mode in _MODES for name in (mode, mode.value)}
@@ -96,6 +97,7 @@ class LandingVectorEnv(VectorEnv[Seen, Array32, Any], Generic[Seen]):
         self.next_episode = np.arange(self.num_envs)
         self._ended = np.zeros(self.num_envs, np.bool_)
         self._seen: Parts = {}
+        self.closed = False
 
     @abstractmethod
     def make_single(self, **options: Any) -> LandingEnv[Any]:

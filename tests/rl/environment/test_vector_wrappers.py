@@ -43,7 +43,8 @@ def test_statistics_of_episodes_are_those_of_single_environments(name):
         assert any(total == pytest.approx(other) and length == steps for other, steps in expected)
 
 
-@pytest.mark.parametrize("name", IDS)
+# before 1.3 the wrapper reads the dictionary in `final_obs` as one of infos
+@pytest.mark.parametrize("name", IDS if gymnasium.__version__ >= "1.3" else IDS[:1])
 def test_infos_become_lists(name):
     envs = vector_wrappers.DictInfoToList(gymnasium.make_vec(name, num_envs=4))
     _, infos = envs.reset(seed=1)
