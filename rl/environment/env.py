@@ -78,6 +78,10 @@ class LandingEnv(gymnasium.Env[ObsType, Array32], Generic[ObsType]):
 
     The objects behind them are `env.unwrapped.outcome` (None in flight), `.steps` and `.scenario`.
 
+    **Many at a time**: `gymnasium.make_vec` (`rl.environment.vector_env.LandingVectorEnv`). `gymnasium.make`
+    truncates after 20 steps, as the rules of every preset do; for rules that allow more pass it
+    `max_episode_steps`.
+
     **Worker processes** that have not imported `rl` know the environments as `"rl:LunarHDA-v0"` and
     `"rl:LunarHDA-Map-v0"`: Gymnasium imports what stands before the colon.
     """

@@ -92,7 +92,7 @@ class LandingVectorEnv(VectorEnv[Seen, Array32, Any], Generic[Seen]):
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self.autoreset_mode = mode
-        self.metadata = {**self.single.metadata, "autoreset_mode": mode}
+        self.metadata = {**self.single.metadata, "render_modes": [], "autoreset_mode": mode}
         self.study_seed: int | None = None
         self.next_episode = np.arange(self.num_envs)
         self._ended = np.zeros(self.num_envs, np.bool_)
@@ -158,6 +158,9 @@ class LandingVectorEnv(VectorEnv[Seen, Array32, Any], Generic[Seen]):
             self._begin(ended, {})
         info |= with_masks(describe_batch(batch), everyone)
         return self._observation(), rewards, terminated, truncated, info
+
+    def render(self) -> None:
+        """None: a batch draws no pictures."""
 
     def close_extras(self, **options: Any) -> None:
         """Let the threads go."""

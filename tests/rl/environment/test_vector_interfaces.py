@@ -48,6 +48,8 @@ def test_make_vec_gives_the_native_vector(name):
     assert vector.metadata["autoreset_mode"] is vector.autoreset_mode is AutoresetMode.SAME_STEP
     seen, _ = vector.reset(seed=0)
     assert vector.observation_space.contains(seen)
+    assert vector.metadata["render_modes"] == []
+    assert vector.render() is None
     assert vector.spec is not None
     again = gymnasium.make_vec(EnvSpec.from_json(vector.spec.to_json()))
     assert again.num_envs == 3
