@@ -64,7 +64,7 @@ def _fetch(probability: NDArray[np.float32], rows: Index, first: int, last: int)
     The look's own loop waits for one line after another of a map that is not in the cache; here many are on
     their way at once.
     """
-    total = np.float32(0.0)
+    total = 0.0
     for row in rows:
         if 0 <= row < probability.shape[0] and first <= last:
             line = probability[row]
