@@ -78,12 +78,16 @@ def _hazard_share(safe: NDArray[np.bool_], x: float, y: float, radius: float) ->
     for row in range(int(y - radius) - 1, int(y + radius) + 2):
         dy = row + 0.5 - y
         reach = math.sqrt(max(0.0, radius * radius - dy * dy))
-        first, last = math.floor(x - reach) - 2, math.floor(x + reach) + 2
-        while first <= last and not _lies_within(first + 0.5 - x, dy, radius):
+        first, last = math.ceil(x - reach - 0.5), math.floor(x + reach - 0.5)
+        if _lies_within(first - 0.5 - x, dy, radius):  # the root was rounded
+            first -= 1
+        elif not _lies_within(first + 0.5 - x, dy, radius):
             first += 1
-        while first <= last and not _lies_within(last + 0.5 - x, dy, radius):
+        if _lies_within(last + 1.5 - x, dy, radius):
+            last += 1
+        elif not _lies_within(last + 0.5 - x, dy, radius):
             last -= 1
-        cells += last - first + 1
+        cells += max(last - first + 1, 0)
         if 0 <= row < rows:
             within = safe[row, max(first, 0) : max(min(last + 1, columns), 0)]
             for k in range(within.size):
