@@ -43,7 +43,13 @@ __getattr__, __dir__ = lazy_exports(
     __name__, {name: home for home, names in _HOMES.items() for name in names}
 )
 
-gymnasium.register("LunarHDA-v0", entry_point="rl.environment.env:LunarHDAEnv")
-gymnasium.register("LunarHDA-Map-v0", entry_point="rl.environment.env:LunarHDAMapEnv")
+for _name, _class in (("LunarHDA-v0", "LunarHDA{}Env"), ("LunarHDA-Map-v0", "LunarHDAMap{}Env")):
+    gymnasium.register(
+        _name,
+        entry_point=f"rl.environment.env:{_class.format('')}",
+        vector_entry_point=f"rl.environment.vector_env:{_class.format('Vector')}",
+        reward_threshold=0.25,
+        max_episode_steps=20,
+    )
 for _entry in entries():
     hda.register_policy(_entry)

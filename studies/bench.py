@@ -7,6 +7,7 @@ machine.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
@@ -28,11 +29,16 @@ from rl.training_libraries import TrainingLibrariesError, require_training_libra
 from studies.campaign.command_line import open_folder
 from studies.campaign.provenance import describe_run, write_provenance
 from studies.columns import Column, console_table, write_csv
+from studies.environment_speed import COLUMNS as RATE_COLUMNS
+from studies.environment_speed import NATIVE, SINGLE, StepRate, measure_environments
 from studies.speed_ratios import COLUMNS as RATIO_COLUMNS
 from studies.speed_ratios import SpeedRatio, measure_ratios
 from studies.terrain_timing import measure_terrain
 
 _BULK, _BULK_CALLS = 2000, 20  # starts of a call, and calls
+
+NATIVE_LIMITS = {"LunarHDA-v0": 0.65, "LunarHDA-Map-v0": 0.5}
+"""Most that a step of a native vector of 64 environments may cost on one thread, in steps of a single one."""
 
 
 @dataclass(frozen=True)
@@ -167,8 +173,23 @@ def measure_rigid_body(options: Bench) -> dict[str, np.ndarray]:
     return {"5 s of flight of a rigid body, attitude loop at 10 Hz": np.array(times)}
 
 
+def compare_native(rates: Sequence[StepRate]) -> list[SpeedRatio]:
+    """A step of each native vector environment over that of a single one, on one thread."""
+    seconds = {(rate.environment, rate.way): rate.processor_seconds for rate in rates}
+    return [
+        SpeedRatio(
+            f"a native step of {name}",
+            "a step of it alone",
+            seconds[name, NATIVE],
+            seconds[name, SINGLE],
+            limit,
+        )
+        for name, limit in NATIVE_LIMITS.items()
+    ]
+
+
 def bench(options: Bench) -> tuple[list[Work], list[SpeedRatio]]:
-    """Measure, write times.csv, ratios.csv and provenance.json, and print both tables.
+    """Measure, write times.csv, ratios.csv, steps.csv and provenance.json, and print the tables.
 
     Raises:
         ValueError: an option is out of range or names something unknown, or the policy is privileged.
@@ -180,12 +201,15 @@ def bench(options: Bench) -> tuple[list[Work], list[SpeedRatio]]:
     measured |= measure_rigid_body(options) | measure_plans(options) | measure_bulk(options)
     works = [Work(name, *np.quantile(seconds, (0.5, 0.99))) for name, seconds in measured.items()]
     works += [Work(wall.name, wall.median, max(wall.seconds)) for wall in measure_terrain(options.repeats)]
-    ratios = measure_ratios(options.preset)
+    rates = measure_environments()
+    ratios = measure_ratios(options.preset) + compare_native(rates)
     write_csv(out / "times.csv", COLUMNS, works)
     write_csv(out / "ratios.csv", RATIO_COLUMNS, ratios)
+    write_csv(out / "steps.csv", RATE_COLUMNS, rates)
     write_provenance(out / "provenance.json", describe_run(options))
     title = f"preset {options.preset}, {options.episodes} episodes; one core unless said"
     console.print(console_table(COLUMNS, works, title))
+    console.print(console_table(RATE_COLUMNS, rates, "environments on paper, steps under random actions"))
     console.print(console_table(RATIO_COLUMNS, ratios, "processor times as ratios, and the limits they keep"))
     (bulk,) = (work for work in works if "solve_pdg_many" in work.name)
     console.print(f"{bulk.name}: {1.0 / bulk.median:.0f} starts a second")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass
 from functools import cached_property
 
@@ -65,20 +66,33 @@ class Tile:
 
 
 @compile_kernel
+def _lies_within(dx: float, dy: float, radius: float) -> bool:
+    return dx * dx + dy * dy <= radius * radius
+
+
+@compile_kernel
 def _hazard_share(safe: NDArray[np.bool_], x: float, y: float, radius: float) -> float:
     rows, columns = safe.shape
     cells = 0
-    hazards = 0
+    clear = 0
     for row in range(int(y - radius) - 1, int(y + radius) + 2):
         dy = row + 0.5 - y
-        for column in range(int(x - radius) - 1, int(x + radius) + 2):
-            dx = column + 0.5 - x
-            if dx * dx + dy * dy <= radius * radius:
-                cells += 1
-                inside = 0 <= row < rows and 0 <= column < columns
-                if not inside or not safe[row, column]:
-                    hazards += 1
-    return hazards / cells
+        reach = math.sqrt(max(0.0, radius * radius - dy * dy))
+        first, last = math.ceil(x - reach - 0.5), math.floor(x + reach - 0.5)
+        if _lies_within(first - 0.5 - x, dy, radius):  # the root was rounded
+            first -= 1
+        elif not _lies_within(first + 0.5 - x, dy, radius):
+            first += 1
+        if _lies_within(last + 1.5 - x, dy, radius):
+            last += 1
+        elif not _lies_within(last + 0.5 - x, dy, radius):
+            last -= 1
+        cells += max(last - first + 1, 0)
+        if 0 <= row < rows:
+            within = safe[row, max(first, 0) : max(min(last + 1, columns), 0)]
+            for k in range(within.size):
+                clear += within[k]
+    return (cells - clear) / cells
 
 
 def make_tile(

@@ -14,9 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from guidance.arrays import Array
-from guidance.kernel import compile_kernel
+from guidance.arrays import Array, Index
+from guidance.kernel import compile_vector_kernel
 from guidance.validation import finite_number
+
+_LINE = 16  # numbers of a cache line
 
 
 @dataclass(frozen=True)
@@ -55,8 +57,25 @@ class Lidar:
         return float(np.linalg.norm(position - target)) * math.tan(self.field_of_view)
 
 
-@compile_kernel
-def _look_into(
+@compile_vector_kernel
+def _fetch(probability: NDArray[np.float32], rows: Index, first: int, last: int) -> bool:
+    """Read one number of each cache line that a look needs; false, since no probability is negative.
+
+    The look's own loop waits for one line after another of a map that is not in the cache; here many are on
+    their way at once.
+    """
+    total = 0.0
+    for row in rows:
+        if 0 <= row < probability.shape[0] and first <= last:
+            line = probability[row]
+            for column in range(first, last, _LINE):
+                total += line[column]
+            total += line[last]
+    return total < 0.0
+
+
+@compile_vector_kernel
+def look_into(
     position: Array,
     target: Array,
     probability: NDArray[np.float32],
@@ -64,26 +83,47 @@ def _look_into(
     sensor: tuple[float, float, float],
     out: NDArray[np.float32],
 ) -> None:
-    """Fill `out` with the observed map; `sensor` is (width, noise per metre, tan off-nadir limit)."""
+    """Fill `out` with the observed map; arguments as of `look`.
+
+    `sensor` is (width, noise per metre, tan off-nadir limit).
+    """
     width, noise_per_metre, limit = sensor
     rows, columns = probability.shape
     n = out.shape[0]
     height = position[2] - target[2]
     reach_squared = (limit * height) ** 2
+    row, column = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.uint64)
+    across_east, across_north = np.empty(n), np.empty(n)
+    first, last = columns, -1
+    for k in range(n):
+        x = target[0] + ((k + 0.5) / n - 0.5) * width
+        y = target[1] + ((k + 0.5) / n - 0.5) * width
+        place = math.floor(x)
+        inside = 0 <= place < columns
+        row[k], column[k] = math.floor(y), np.uint64(place if inside else 0)
+        dx, dy = x - position[0], y - position[1]
+        across_east[k], across_north[k] = dx * dx if inside else math.inf, dy * dy
+        if inside:
+            first, last = min(first, place), max(last, place)
+    if _fetch(probability, row, first, last):
+        return
+    true = np.empty(n, dtype=np.float32)
     for i in range(n):
-        y = target[1] + ((i + 0.5) / n - 0.5) * width
-        row = math.floor(y)
-        dy = y - position[1]
+        seen, drawn = out[i], noise[i]
+        if not 0 <= row[i] < rows:
+            for j in range(n):
+                seen[j] = 0.0
+            continue
+        line = probability[row[i]]
         for j in range(n):
-            x = target[0] + ((j + 0.5) / n - 0.5) * width
-            column = math.floor(x)
-            dx = x - position[0]
-            across = dx * dx + dy * dy
-            value = 0.0
-            if across <= reach_squared and 0 <= row < rows and 0 <= column < columns:
-                deviation = noise_per_metre * math.sqrt(across + height * height)
-                value = min(1.0, max(0.0, probability[row, column] + deviation * noise[i, j]))
-            out[i, j] = value
+            true[j] = line[column[j]]
+        for j in range(n):
+            across = across_east[j] + across_north[i]
+            deviation = noise_per_metre * math.sqrt(across + height * height)
+            value = true[j] + deviation * drawn[j]
+            value = value if value > 0.0 else 0.0
+            value = value if value < 1.0 else 1.0
+            seen[j] = value if across <= reach_squared else 0.0
 
 
 def look(
@@ -111,5 +151,5 @@ def look(
         lidar.noise / lidar.noise_range,
         math.tan(lidar.off_nadir_limit),
     )
-    _look_into(position, target, probability, noise, sensor, out)
+    look_into(position, target, probability, noise, sensor, out)
     return out

@@ -1,7 +1,7 @@
-"""Standard normal noise from a seed, in compiled code: numpy's own streams, to the bit.
+"""Random numbers from a seed, in compiled code: numpy's own streams, to the bit.
 
-What `Generator(PCG64(SeedSequence(...))).standard_normal(dtype=float32)` draws: the hash of the
-seed, the generator and the ziggurat run in one kernel. numpy is the oracle in the tests.
+What `Generator(PCG64(SeedSequence(...)))` draws first: `standard_normal(dtype=float32)` and `random()`. The
+hash of the seed, the generator and the ziggurat run in one kernel. numpy is the oracle in the tests.
 
 Sources: O'Neill, "PCG", HMC-CS-2014-0905 (128 bits, XSL RR); Marsaglia and Tsang, Journal of Statistical
 Software 5(8), 2000 (ziggurat), as numpy states them.
@@ -26,7 +26,9 @@ _TAIL = 3.6541528853610088  # where the ziggurat's lowest layer ends
 _LAYERS = 256
 _STEPS = 2.0**23  # of a layer's width
 _LOW = np.uint64(0xFFFFFFFF)
-_U16, _U32, _U58, _U63, _U64 = (np.uint64(n) for n in (16, 32, 58, 63, 64))
+_UNIT = 2.0**-53
+_LAYER, _SIGN, _CODE = np.uint64(0xFF), np.uint64(0x100), np.uint64(0x7FFFFF)
+_U9, _U11, _U16, _U32, _U58, _U63, _U64 = (np.uint64(n) for n in (9, 11, 16, 32, 58, 63, 64))
 _HASH_SEED, _HASH_FACTOR = np.uint64(0x43B0D7E5), np.uint64(0x931E8875)
 _STATE_SEED, _STATE_FACTOR = np.uint64(0x8B51F9DD), np.uint64(0x58F38DED)
 _MIX_LEFT, _MIX_RIGHT = np.uint64(0xCA01F9DD), np.uint64(0x4973F715)
@@ -119,6 +121,56 @@ def _draw_word(state: _State) -> np.uint64:
 
 
 @compile_vector_kernel
+def _begin_stream(seed: Words) -> tuple[_State, _State]:
+    """First state of PCG64 from a seed of at least POOL words, and the increment of its states."""
+    words = _generate_state(seed)
+    increment = (words[2] << _ONE) | (words[3] >> _U63), (words[3] << _ONE) | _ONE
+    low = increment[1] + words[1]
+    carry = _ONE if low < words[1] else _NONE
+    return _advance((increment[0] + words[0] + carry, low), increment), increment
+
+
+@compile_vector_kernel
+def draw_unit(seed: Words) -> float:
+    """The first uniform number of a seed, in [0, 1); the seed as for `draw_normals`."""
+    state, increment = _begin_stream(seed)
+    return np.float64(_draw_word(_advance(state, increment)) >> _U11) * _UNIT
+
+
+@compile_vector_kernel
+def draw_symmetric(seed: Words, bound: float) -> float:
+    """The first number of a seed that is uniform in [-bound, bound)."""
+    return -bound + (bound + bound) * draw_unit(seed)
+
+
+@compile_vector_kernel
+def _take_step(bits: np.uint64) -> tuple[np.float32, bool]:
+    """The step in a layer that 32 bits give, and whether it is within the next layer."""
+    layer, code = bits & _LAYER, (bits >> _U9) & _CODE
+    step = np.float32(code) * _STEP_WIDTHS[layer]
+    return -step if bits & _SIGN else step, code < _STEPS_WITHIN[layer]
+
+
+@compile_vector_kernel
+def _fill_within(
+    state: _State, increment: _State, out: NDArray[np.float32], filled: int
+) -> tuple[_State, np.uint64, int]:
+    """Fill from `filled` on by words of which both halves are within their next layers: nine of ten are.
+
+    Returns the state, the first word that is not so, and how much is filled.
+    """
+    while True:
+        state = _advance(state, increment)
+        word = _draw_word(state)
+        first, one = _take_step(word & _LOW)
+        second, other = _take_step(word >> _U32)
+        if filled + 2 > out.size or not (one and other):
+            return state, word, filled
+        out[np.uint64(filled)], out[np.uint64(filled + 1)] = first, second
+        filled += 2
+
+
+@compile_vector_kernel
 def fill_normals(seed: Words, out: NDArray[np.float32]) -> None:
     """Fill a flat array with the first normals of a seed.
 
@@ -126,27 +178,26 @@ def fill_normals(seed: Words, out: NDArray[np.float32]) -> None:
         seed: its words, at least POOL.
         out: shape (n,).
     """
-    words = _generate_state(seed)
-    increment = (words[2] << _ONE) | (words[3] >> _U63), (words[3] << _ONE) | _ONE
-    low = increment[1] + words[1]
-    carry = _ONE if low < words[1] else _NONE
-    state = _advance((increment[0] + words[0] + carry, low), increment)
+    state, increment = _begin_stream(seed)
     word, halves, filled = _NONE, 0, 0
     step, layer, stage = np.float32(0.0), 0, 0
     reach, code = np.float32(0.0), np.uint32(0)
     unit, tail = np.float32(1.0 / 16777216.0), np.float32(_TAIL)
     while filled < out.size:
-        if halves == 0:
+        if halves == 0 and stage == 0:
+            state, word, filled = _fill_within(state, increment, out, filled)
+            halves = 2
+            if filled == out.size:
+                return
+        elif halves == 0:
             state = _advance(state, increment)
             word, halves = _draw_word(state), 2
         bits, word, halves = np.uint32(word & _LOW), word >> _U32, halves - 1
         uniform = np.float32(bits >> np.uint32(8)) * unit
         if stage == 0:  # a layer, a sign and a step in the layer
             layer, code = np.int64(bits & np.uint32(0xFF)), (bits >> np.uint32(9)) & np.uint32(0x7FFFFF)
-            step = np.float32(code) * _STEP_WIDTHS[layer]
-            if bits & np.uint32(0x100):
-                step = -step
-            if code < _STEPS_WITHIN[layer]:
+            step, within = _take_step(np.uint64(bits))
+            if within:
                 out[filled], filled = step, filled + 1
             else:
                 stage = 1 if layer else 2

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from guidance.arrays import Array
 from hda.navigation.sensor_errors import FixDraws, ReadingDraws, draw_fix, draw_readings
 from hda.sensing.scan_draws import ScanDraws, draw_scan
-from hda.task.look_noise import POOL, draw_normals
+from hda.task.look_noise import POOL, Words, draw_normals, draw_symmetric, draw_unit
 
 _SCENARIO, _SENSOR, _ACTUATOR, _POLICY, _NAVIGATION = range(5)
 _WORD = 2**32
@@ -60,13 +60,13 @@ class EpisodeStreams:
             entropy += [len(words), *words]
         return entropy
 
-    def _words(self, *key: int) -> NDArray[np.uint32]:
-        """The seed of a child as SeedSequence puts it together: the entropy filled up, then the key."""
+    def _seed(self, *key: int) -> Words:
+        """Words of a seed as SeedSequence puts them together: the shared ones, filled up with zeros, then the key."""
         entropy = self._entropy
         return np.array([*entropy, *[0] * (POOL - len(entropy)), *key], dtype=np.uint32)
 
     def _generator(self, *key: int) -> np.random.Generator:
-        sequence = np.random.SeedSequence(self._words(*key))  # a spawn key would take numpy longer
+        sequence = np.random.SeedSequence(self._seed(*key))  # a spawn key would take numpy longer
         return np.random.Generator(np.random.PCG64(sequence))
 
     def scenario(self) -> np.random.Generator:
@@ -80,6 +80,10 @@ class EpisodeStreams:
     def look(self, index: int, pixels: int) -> NDArray[np.float32]:
         """Standard normal noise of look `index`, shape (pixels, pixels); read-only."""
         return _draw_look(self, index, pixels)
+
+    def look_seed(self, index: int) -> Words:
+        """Seed of the noise of look `index`, for `hda.task.look_noise`; its last word is the index."""
+        return self._seed(_SENSOR, index)
 
     def scan(self, index: int, rays: int) -> ScanDraws:
         """All that chance does to the scan of look `index`, of rays x rays."""
@@ -104,7 +108,11 @@ class EpisodeStreams:
 
     def map_is_missing(self, index: int, probability: float) -> bool:
         """Whether look `index` comes without a map."""
-        return bool(self._generator(_SENSOR, index, 1).random() < probability)
+        return bool(draw_unit(self._seed(_SENSOR, index, 1)) < probability)
+
+    def thrust_seed(self, index: int) -> Words:
+        """Seed of the thrust error of interval `index`; its last word is the index."""
+        return self._seed(_ACTUATOR, index)
 
     def thrust_error(self, index: int, bound: float) -> float:
         """Relative thrust error of interval `index`, uniform in [-bound, bound]."""
@@ -114,7 +122,7 @@ class EpisodeStreams:
 @lru_cache(maxsize=32)
 def _draw_look(streams: EpisodeStreams, index: int, pixels: int) -> NDArray[np.float32]:
     """Kept for the other policies that fly the episode."""
-    noise = draw_normals(streams._words(_SENSOR, index), (pixels, pixels))
+    noise = draw_normals(streams.look_seed(index), (pixels, pixels))
     noise.flags.writeable = False
     return noise
 
@@ -122,4 +130,4 @@ def _draw_look(streams: EpisodeStreams, index: int, pixels: int) -> NDArray[np.f
 @lru_cache(maxsize=64)
 def _draw_thrust_error(streams: EpisodeStreams, index: int, bound: float) -> float:
     """Kept as `_draw_look` is."""
-    return float(streams._generator(_ACTUATOR, index).uniform(-bound, bound))
+    return float(draw_symmetric(streams.thrust_seed(index), float(bound)))

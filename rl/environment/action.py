@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from guidance.arrays import Array
 from guidance.validation import finite_number
 from hda.policy import Decision, ZemZevCommand
 from hda.task.observation import Observation
@@ -47,6 +49,54 @@ class ActionRanges:
 PAPER_ACTIONS = ActionRanges()
 
 
+class ScaledActions(NamedTuple):
+    """What actions mean, each an array of the shape of the leading axes.
+
+    Attributes:
+        position_gain: K_R.
+        velocity_gain: K_V.
+        time_to_go_rate: by how much the time to go falls in a second.
+        shift_x: [m] by which the target moves east.
+        shift_y: [m] by which the target moves north.
+    """
+
+    position_gain: Array
+    velocity_gain: Array
+    time_to_go_rate: Array
+    shift_x: Array
+    shift_y: Array
+
+
+def scale_actions(
+    actions: NDArray[np.floating], widths: Array, ranges: ActionRanges = PAPER_ACTIONS
+) -> ScaledActions:
+    """What actions mean.
+
+    Args:
+        actions: shape (..., 5), in the order of `ACTION_NAMES`; values outside [-1, 1] are clipped.
+        widths: [m] shape (...), of the looks: the target moves by a share of them.
+        ranges: what -1 and 1 mean.
+
+    Raises:
+        ValueError: the actions have another shape or are not finite.
+    """
+    values = np.asarray(actions, dtype=np.float64)
+    expected = (*np.shape(widths), 5)
+    if values.shape != expected:
+        raise ValueError(f"action must have shape {expected}, got {values.shape}")
+    if not np.isfinite(values).all():
+        raise ValueError(f"action must be finite, got {values.tolist()}")
+    position_gain, velocity_gain, step, shift_x, shift_y = np.moveaxis(np.clip(values, -1.0, 1.0), -1, 0)
+    greatest = ranges.shift * widths
+    return ScaledActions(
+        _between(ranges.position_gain, position_gain),
+        _between(ranges.velocity_gain, velocity_gain),
+        _between(ranges.time_to_go_step, step) / ranges.nominal_interval,
+        shift_x * greatest,
+        shift_y * greatest,
+    )
+
+
 def decide_action(
     action: NDArray[np.floating], observation: Observation, ranges: ActionRanges = PAPER_ACTIONS
 ) -> Decision:
@@ -61,23 +111,17 @@ def decide_action(
     Raises:
         ValueError: the action has another shape or is not finite.
     """
-    values = np.asarray(action, dtype=np.float64)
-    if values.shape != (5,):
-        raise ValueError(f"action must have shape (5,), got {values.shape}")
-    if not np.isfinite(values).all():
-        raise ValueError(f"action must be finite, got {values.tolist()}")
-    position_gain, velocity_gain, step, shift_x, shift_y = np.clip(values, -1.0, 1.0).tolist()
-    greatest = ranges.shift * observation.width
-    site = observation.settled(observation.target + np.array([shift_x * greatest, shift_y * greatest, 0.0]))
+    scaled = scale_actions(action, np.asarray(observation.width), ranges)
+    shift = np.array([scaled.shift_x, scaled.shift_y, 0.0])
     command = ZemZevCommand(
-        position_gain=_between(ranges.position_gain, position_gain),
-        velocity_gain=_between(ranges.velocity_gain, velocity_gain),
+        position_gain=float(scaled.position_gain),
+        velocity_gain=float(scaled.velocity_gain),
         time_to_go=observation.time_to_go,
-        time_to_go_rate=_between(ranges.time_to_go_step, step) / ranges.nominal_interval,
+        time_to_go_rate=float(scaled.time_to_go_rate),
     )
-    return Decision(site, command)
+    return Decision(observation.settled(observation.target + shift), command)
 
 
-def _between(bounds: Range, value: float) -> float:
+def _between(bounds: Range, values: Array) -> Array:
     """Map [-1, 1] on the range."""
-    return bounds.low + 0.5 * (value + 1.0) * (bounds.high - bounds.low)
+    return bounds.low + 0.5 * (values + 1.0) * (bounds.high - bounds.low)

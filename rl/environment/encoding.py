@@ -9,11 +9,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from guidance.arrays import Array
+from guidance.kernel import compile_kernel
 from hda.task.observation import Observation
 from rl.inference.arrays import Array32
 
@@ -82,9 +84,9 @@ class Layout:
         return np.array([element.high for element in self.elements], dtype=np.float32)
 
     def scaled(self, values: Array) -> Array32:
-        """Encode the physical values of the elements, shape (k,)."""
+        """Encode the physical values of the elements, shape (..., k)."""
         scaled = (values - self.center) / self.scale
-        scaled[self.curved] = 0.5 * np.arcsinh(scaled[self.curved])
+        scaled[..., self.curved] = 0.5 * np.arcsinh(scaled[..., self.curved])
         return np.clip(scaled, self.low, self.high).astype(np.float32)
 
 
@@ -153,31 +155,62 @@ PRINTED = Layout(
 LAYOUTS = {layout.name: layout for layout in (RELATIVE, CURVED, PRINTED)}
 
 
-def encode_flight(layout: Layout, observation: Observation, nominal_target: Array) -> Array32:
-    """Encode all of an observation but its map.
+class SeenFlight(NamedTuple):
+    """All that is seen but the map, of one flight or of many: the leading axes of every array.
+
+    Attributes:
+        position: [m] shape (..., 3), estimated.
+        velocity: [m/s] shape (..., 3), estimated.
+        mass: [kg] shape (..., 1).
+        width: [m] shape (..., 1), of the look.
+        time_to_go: [s] shape (..., 1).
+        target: [m] shape (..., 3).
+    """
+
+    position: Array
+    velocity: Array
+    mass: Array
+    width: Array
+    time_to_go: Array
+    target: Array
+
+
+def encode_flights(layout: Layout, seen: SeenFlight, nominal_target: Array) -> Array32:
+    """Encode all that is seen but the map.
 
     Heights count as if the target lay on the plane of the first one: on measured ground as on the plane.
 
     Args:
         layout: which elements.
-        observation: what was seen.
-        nominal_target: [m] shape (3,), first target of the episode.
+        seen: of one flight or of many.
+        nominal_target: [m] shape (..., 3), first target of each episode.
 
     Returns:
-        Shape (12,).
+        Shape (..., 12).
+    """
+    lift = np.zeros_like(seen.target)
+    lift[..., 2] = seen.target[..., 2] - nominal_target[..., 2]
+    position, target = seen.position - lift, seen.target - lift
+    if layout is not PRINTED:
+        clock = seen.width, seen.time_to_go
+        parts = position - target, seen.velocity, seen.mass, *clock, target - nominal_target
+    else:
+        parts = position, seen.velocity, seen.mass, seen.width, seen.width, target
+    return layout.scaled(np.concatenate(parts, axis=-1))
+
+
+def encode_flight(layout: Layout, observation: Observation, nominal_target: Array) -> Array32:
+    """Encode all of an observation but its map: shape (12,).
+
+    Args:
+        layout: which elements.
+        observation: what was seen.
+        nominal_target: [m] shape (3,), first target of the episode.
     """
     state = observation.state
-    lift = np.array([0.0, 0.0, observation.target[2] - nominal_target[2]])
-    position, target = state.position - lift, observation.target - lift
-    if layout is not PRINTED:
-        clock = (observation.width, observation.time_to_go)
-        parts = (position - target, state.velocity, (state.mass,), clock)
-        values = np.concatenate([*parts, target - nominal_target])
-    else:
-        widths = (observation.width, observation.width)
-        parts = (position, state.velocity, (state.mass,), widths, target)
-        values = np.concatenate(parts)
-    return layout.scaled(values)
+    mass, width, clock = np.array([[state.mass], [observation.width], [observation.time_to_go]])
+    seen = SeenFlight(state.position, state.velocity, mass, width, clock, observation.target)
+    return encode_flights(layout, seen, nominal_target)
 
 
 def encode_observation(
@@ -187,5 +220,24 @@ def encode_observation(
     latent: Array32,
 ) -> Array32:
     """Join the encoded flight and the latent of the map: shape (44,)."""
-    clipped = np.clip(latent, -LATENT_BOUND, LATENT_BOUND)
-    return np.concatenate([encode_flight(layout, observation, nominal_target), clipped])
+    return np.concatenate([encode_flight(layout, observation, nominal_target), clip_latent(latent)])
+
+
+def clip_latent(latent: Array32) -> Array32:
+    """The latent of a map as it stands in the vector, shape (..., 32)."""
+    return np.clip(latent, -LATENT_BOUND, LATENT_BOUND)
+
+
+@compile_kernel
+def map_into(safety_map: Array32, out: NDArray[np.uint8]) -> None:
+    """Write a safety map times 255 into `out`, of the same shape."""
+    for i in range(safety_map.shape[0]):
+        for j in range(safety_map.shape[1]):
+            out[i, j] = np.uint8(np.rint(safety_map[i, j] * np.float32(255.0)))
+
+
+def encode_map(safety_map: Array32) -> NDArray[np.uint8]:
+    """A safety map times 255, shape (pixels, pixels)."""
+    out = np.empty(safety_map.shape, np.uint8)
+    map_into(safety_map, out)
+    return out

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Collection
 from dataclasses import fields
 from typing import Any, Generic, TypeVar
 
@@ -19,7 +20,15 @@ from hda.task.presets import Preset, find_preset
 from hda.task.scenario import Scenario
 from rl.environment.action import PAPER_ACTIONS, ActionRanges, decide_action
 from rl.environment.dispersions import Dispersions
-from rl.environment.encoding import CURVED, LATENT_BOUND, LAYOUTS, Layout, encode_flight, encode_observation
+from rl.environment.encoding import (
+    CURVED,
+    LATENT_BOUND,
+    LAYOUTS,
+    Layout,
+    encode_flight,
+    encode_map,
+    encode_observation,
+)
 from rl.environment.episode_info import describe_episode
 from rl.environment.episode_source import EpisodeSource
 from rl.inference.arrays import Array32
@@ -27,8 +36,7 @@ from rl.inference.artefacts import ENCODER
 from rl.inference.latent import LATENT_SIZE, encoder_path, load_encoder
 
 ObsType = TypeVar("ObsType")
-_DISPERSION_NAMES = tuple(entry.name for entry in fields(Dispersions))
-_OPTIONS = ("scenario", *_DISPERSION_NAMES)
+DISPERSION_NAMES = tuple(entry.name for entry in fields(Dispersions))
 
 
 class LandingEnv(gymnasium.Env[ObsType, Array32], Generic[ObsType]):
@@ -69,6 +77,10 @@ class LandingEnv(gymnasium.Env[ObsType, Array32], Generic[ObsType]):
     | `is_success`, `safe_site` | bool | false in flight |
 
     The objects behind them are `env.unwrapped.outcome` (None in flight), `.steps` and `.scenario`.
+
+    **Many at a time**: `gymnasium.make_vec` (`rl.environment.vector_env.LandingVectorEnv`). `gymnasium.make`
+    truncates after 20 steps, as the rules of every preset do; for rules that allow more pass it
+    `max_episode_steps`.
 
     **Worker processes** that have not imported `rl` know the environments as `"rl:LunarHDA-v0"` and
     `"rl:LunarHDA-Map-v0"`: Gymnasium imports what stands before the colon.
@@ -136,14 +148,13 @@ class LandingEnv(gymnasium.Env[ObsType, Array32], Generic[ObsType]):
         """
         super().reset(seed=seed)
         chosen = dict(options or {})
-        unknown = sorted(set(chosen) - set(_OPTIONS))
-        if unknown:
-            raise ValueError(f"options must be among {', '.join(_OPTIONS)}, got {', '.join(unknown)}")
+        refuse_unknown_options(chosen, ("scenario", *DISPERSION_NAMES))
         if seed is not None or self.study_seed is None:
             self.study_seed = int(self.np_random.integers(2**31)) if seed is None else seed
             self.next_episode = 0
         scenario = chosen.pop("scenario", None)
         if scenario is None:
+            self.source.prepare()
             scenario = self.source.scenario(self.study_seed, self.next_episode, chosen)
             self.next_episode += 1
         elif not isinstance(scenario, Scenario):
@@ -200,6 +211,13 @@ class LandingEnv(gymnasium.Env[ObsType, Array32], Generic[ObsType]):
         self._observation = observe(self.scenario, flight)
         seen = self.encode(self._observation, self.scenario.nominal_target)
         return seen, describe_episode(self.scenario, flight, self.steps)
+
+
+def refuse_unknown_options(options: Collection[str], known: tuple[str, ...]) -> None:
+    """Raise ValueError where an option of `reset` is not known."""
+    unknown = sorted(set(options) - set(known))
+    if unknown:
+        raise ValueError(f"options must be among {', '.join(known)}, got {', '.join(unknown)}")
 
 
 class LunarHDAEnv(LandingEnv[Array32]):
@@ -272,5 +290,5 @@ class LunarHDAMapEnv(LandingEnv[dict[str, Any]]):
         """The flight and the map."""
         return {
             "flight": encode_flight(self.layout, observation, nominal_target),
-            "map": np.round(observation.safety_map[None] * 255.0).astype(np.uint8),
+            "map": encode_map(observation.safety_map)[None],
         }

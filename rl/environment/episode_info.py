@@ -14,12 +14,18 @@ import numpy as np
 
 from hda.flight.episode import Flight, Step
 from hda.flight.outcome import Ending, RewardTerms
+from hda.task.random_streams import EpisodeStreams
 from hda.task.scenario import Scenario, ground_point
 
 ENDING_CODES = {ending: code for code, ending in enumerate(Ending, start=1)}
 """The number that stands for each ending in `info`; 0 is in flight."""
 
 _LARGEST = 2**63 - 1
+
+
+def study_number(streams: EpisodeStreams) -> int:
+    """The study seed as it stands in `info`: -1 where it has more than 63 bits."""
+    return int(streams.study_seed) if streams.study_seed <= _LARGEST else -1
 
 
 def describe_episode(scenario: Scenario, flight: Flight, steps: Sequence[Step]) -> dict[str, Any]:
@@ -35,7 +41,7 @@ def describe_episode(scenario: Scenario, flight: Flight, steps: Sequence[Step]) 
     start, dry_mass = scenario.initial_state.mass, scenario.preset.lander.dry_mass
     miss = state.position - ground_point(scenario, flight.target)
     return {
-        "study_seed": int(streams.study_seed) if streams.study_seed <= _LARGEST else -1,
+        "study_seed": study_number(streams),
         "episode_number": int(streams.episode),
         "tile": int(scenario.tile.number),
         "reward_terms": asdict(steps[-1].reward if steps else RewardTerms()),

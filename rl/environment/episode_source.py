@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
-from hda.ground.library import Ground, tile_numbers
+from hda.ground.library import Ground, prepare_tiles, tile_numbers
 from hda.task.presets import Preset, find_preset
 from hda.task.scenario import Scenario, sample_scenario
 from rl.environment.dispersions import Dispersions
@@ -32,8 +33,23 @@ class EpisodeSource:
         setting = find_preset(self.preset)
         tile_numbers(self.split, Ground(setting.terrain, setting.criteria))
 
+    @cached_property
+    def _setting(self) -> Preset:
+        return self.dispersions.applied(find_preset(self.preset))
+
+    @cached_property
+    def _ready(self) -> bool:
+        setting = find_preset(self.preset)
+        prepare_tiles(Ground(setting.terrain, setting.criteria), self.split)
+        return True
+
+    def prepare(self) -> None:
+        """Build the tiles of the split that are missing, with a progress bar; once for each source."""
+        assert self._ready
+
     def scenario(self, study_seed: int, episode: int, changes: dict[str, float]) -> Scenario:
         """Draw one; `changes` replace single dispersions."""
-        dispersions = replace(self.dispersions, **changes)
-        setting = dispersions.applied(find_preset(self.preset))
+        setting = self._setting
+        if changes:
+            setting = replace(self.dispersions, **changes).applied(find_preset(self.preset))
         return sample_scenario(setting, study_seed, episode, self.split)

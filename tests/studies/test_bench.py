@@ -48,6 +48,16 @@ def test_the_bench_leaves_its_tables(tmp_path: Path) -> None:
     assert [row["work"] for row in times] == [work.name for work in works]
     assert all(0.0 < float(row["median_ms"]) <= float(row["high_ms"]) for row in times)
     assert [float(row["ratio"]) for row in kept] == pytest.approx([ratio.ratio for ratio in ratios])
+    with (tmp_path / "steps.csv").open() as stream:
+        steps = list(csv.DictReader(stream))
+    ways = [row["way"].split(",")[0] for row in steps if row["environment"] == "LunarHDA-v0"]
+    assert list(dict.fromkeys(ways)) == ["one", "sync", "async", "native"]
+    assert {row["environment"] for row in steps} == {"LunarHDA-v0", "LunarHDA-Map-v0"}
+    assert all(float(row["steps_per_second"]) > 0.0 for row in steps)
+    assert all((row["processor_us"] == "") == row["way"].startswith("async") for row in steps)
+    native = {ratio.work: ratio for ratio in ratios if "native" in ratio.work}
+    assert len(native) == 2
+    assert all(ratio.ratio < 1.0 for ratio in native.values())
     assert json.loads((tmp_path / "provenance.json").read_text())["options"]["episodes"] == 3
 
 

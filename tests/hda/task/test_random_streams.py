@@ -52,6 +52,19 @@ def test_millions_of_values_of_looks_are_numpys_to_the_bit():
     assert tail > 300
 
 
+def test_compiled_uniform_numbers_are_numpys_to_the_bit():
+    differing = 0
+    for seed in (0, 7, 2**32 - 1, 2**40, 2**70):
+        for episode in range(400):
+            streams = EpisodeStreams(seed, episode)
+            error = streams._generator(ACTUATOR, episode % 20).uniform(-0.05, 0.05)
+            missing = streams._generator(SENSOR, episode % 20, 1).random()
+            differing += streams.thrust_error(episode % 20, 0.05) != error
+            differing += streams.map_is_missing(episode % 20, missing)  # not below itself
+            differing += not streams.map_is_missing(episode % 20, np.nextafter(missing, 1.0))
+    assert differing == 0
+
+
 def test_a_look_is_kept_for_the_next_policy_and_nobody_can_change_it():
     noise = EpisodeStreams(3, 7).look(2, 16)
     assert EpisodeStreams(3, 7).look(2, 16) is noise

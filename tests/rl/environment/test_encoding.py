@@ -7,7 +7,15 @@ from hypothesis import strategies as st
 
 from guidance.state import State
 from hda.task.observation import Observation
-from rl.environment.encoding import CURVED, LATENT_BOUND, LAYOUTS, PRINTED, RELATIVE, encode_observation
+from rl.environment.encoding import (
+    CURVED,
+    LATENT_BOUND,
+    LAYOUTS,
+    PRINTED,
+    RELATIVE,
+    encode_map,
+    encode_observation,
+)
 from rl.inference.latent import LATENT_SIZE
 
 LATENT = np.linspace(-1.0, 1.0, LATENT_SIZE, dtype=np.float32)
@@ -79,3 +87,11 @@ def test_always_inside_finite_bounds(position, velocity, mass, clock):
         assert np.all(vector[:12] >= layout.low)
         assert np.all(vector[:12] <= layout.high)
         assert np.all(vector[12:] == LATENT_BOUND)
+
+
+def test_a_map_is_rounded_to_bytes_as_numpy_rounds():
+    halves = (np.arange(256, dtype=np.float32) + np.float32(0.5)) / np.float32(255.0)
+    drawn = np.random.default_rng(0).random((62, 64), dtype=np.float32)
+    safety_map = np.concatenate([np.clip(halves, 0.0, 1.0).reshape(4, 64), drawn])
+    assert np.array_equal(encode_map(safety_map), np.round(safety_map * 255.0).astype(np.uint8))
+    assert encode_map(np.array([[0.0, 1.0]], np.float32)).tolist() == [[0, 255]]
