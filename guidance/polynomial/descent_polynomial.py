@@ -3,8 +3,7 @@
 E-guidance (Cherry, "A general, explicit, optimizing guidance law for rocket-propelled spaceflight", AIAA
 64-638, 1964) takes a linear one, the least that meets a position and a velocity. The lunar module's P63 and
 P64 (Klumpp, "Apollo lunar descent guidance", Automatica 10, 1974) take a quadratic one, which meets an
-acceleration too; Chandrayaan-3's powered descent is of that family. With s the time to go and d = r_f, v_f,
-a_f the arrival,
+acceleration too. With s the time to go, T of it at the start, and r_f, v_f and a_f at the end,
 
     linear      r = r_f - v_f s + p s^2 + q s^3,                 p and q from r and v at s = T,
     quadratic   r = r_f - v_f s + a_f s^2 / 2 + b s^3 + c s^4,   b and c from the same,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from guidance.tracking.soft_landing import SoftLandingOptions
 from hda.policies.composition import ComposedPolicy, PrivilegedComposition
-from hda.policies.deferred_decision import DeferredDecisionPolicy
+from hda.policies.deferred_decision import DeferredDecisionOptions, DeferredDecisionPolicy
 from hda.policies.entry import PolicyEntry
 from hda.policies.hazard_aware import HazardAwareSite
 from hda.policies.planned_descent import PlannedDescent
@@ -113,6 +113,14 @@ ENTRIES: tuple[PolicyEntry, ...] = (
         "reachability-steering+convex",
         lambda: ComposedPolicy("reachability-steering+convex", ReachabilitySteeringSite(), PlannedDescent()),
         "the sites of reachability-steering, flown by convex guidance",
+        rival=True,
+    ),
+    PolicyEntry(
+        "adaptive-deferred-decision",
+        lambda: DeferredDecisionPolicy(
+            "adaptive-deferred-decision", DeferredDecisionOptions(candidates=7, sheds=True)
+        ),
+        "as deferred-decision, but seven candidates are given up one after another, down to two",
         rival=True,
     ),
     PolicyEntry(

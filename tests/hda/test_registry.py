@@ -145,7 +145,9 @@ def test_a_policy_made_for_a_preset_belongs_there_alone(monkeypatch):
 
 def test_a_rival_flies_when_it_is_asked_for():
     rivals = choose_policies(("rivals",), "paper")[0]
-    assert {"alhat", "reachability-steering", "nearest-safe+apollo", "nearest-safe+e-guidance"} <= set(rivals)
+    assert {"alhat", "reachability-steering", "adaptive-deferred-decision", "nearest-safe+apollo"} <= set(
+        rivals
+    )
     assert not set(rivals) & set(choose_policies(("default",), "paper")[0])
     assert set(rivals) <= set(choose_policies(("all",), "paper")[0])
 
