@@ -118,9 +118,9 @@ ENTRIES: tuple[PolicyEntry, ...] = (
     PolicyEntry(
         "adaptive-deferred-decision",
         lambda: DeferredDecisionPolicy(
-            "adaptive-deferred-decision", DeferredDecisionOptions(candidates=7, sheds=True)
+            "adaptive-deferred-decision", DeferredDecisionOptions(candidates=5, sheds=True)
         ),
-        "as deferred-decision, but seven candidates are given up one after another, down to two",
+        "as deferred-decision, but five candidates are given up one after another, down to two",
         rival=True,
     ),
     PolicyEntry(

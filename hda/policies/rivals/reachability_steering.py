@@ -3,9 +3,9 @@
 After Tomita and Ho ("Powered descent decision making: a reachability-steering approach", AIAA SciTech, 2026),
 whose lander maximises the safety of what lies both within its reach and within its field of view. While there
 is a look to come, each target on a lattice is judged by the mean probability of safety over the cells that
-the look from there would show (its square, and its cone about the vertical) and that could still be reached from
-there with the propellant left. The best is steered to. Near the end the site itself is chosen: the nearest
-within reach that is likely to be safe, else the likeliest.
+the look from there would show (its square, and its cone about the vertical) and that could still be reached
+from there with the propellant left. The best is steered to. Near the end the site itself is chosen: the
+nearest within reach that is likely to be safe, else the likeliest.
 
 Deviations. The paper on this law could not be read; what it maximises is from the summary in the abstract of
 Ou and Ozaki (ISSFD, 2026). Safety is the belief from all looks of `hazard_aware`, which is not theirs (they
