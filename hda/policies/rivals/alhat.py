@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from guidance.arrays import Array
+from guidance.state import State
 from guidance.two_impulse import divert_cost
 from guidance.validation import finite_number
 from hda.policies.beliefs.surroundings import squared_distance
@@ -87,7 +88,10 @@ class AlhatSite:
     weights: AlhatWeights = AlhatWeights()
 
     def begin(self, view: ScenarioView) -> AlhatMemory:
-        """Nothing scanned yet."""
+        """Nothing scanned yet; kernels are loaded here, so that the scan does not wait for them."""
+        hazard_distance(np.zeros((1, 1), dtype=np.bool_))
+        above, place = State(np.array([0.0, 0.0, 100.0]), np.zeros(3), view.lander.dry_mass), np.zeros(1)
+        divert_cost(above, place, place, 0.0, view.lander, view.gravity)
         return AlhatMemory(view)
 
     def select(self, observation: Observation, memory: AlhatMemory) -> tuple[Array, AlhatMemory]:
