@@ -47,6 +47,8 @@ class DeferredDecisionOptions:
             safe.
         commit_time: [s] with less time to go than this the site is kept whatever is seen.
         nodes: of each branch.
+        sheds: where the trunk to all candidates parts too early, the last of them is given up and the others
+            are kept open, down to two (HALO); else the first is committed to at once.
     """
 
     candidates: int = 3
@@ -58,6 +60,7 @@ class DeferredDecisionOptions:
     keep_probability: float = 0.9
     commit_time: float = 2.5
     nodes: int = 21
+    sheds: bool = False
 
     def __post_init__(self) -> None:
         """Refuse options that mean nothing."""
@@ -105,6 +108,10 @@ class Candidates:
         """Shape (k,): chance that each is the first safe one in this order."""
         unsafe = 1.0 - self.probability
         return self.probability * np.concatenate([[1.0], np.cumprod(unsafe[:-1])])
+
+    def first(self, count: int) -> Candidates:
+        """The best of them."""
+        return Candidates(self.sites[:count], self.probability[:count])
 
     def without(self, numbers: tuple[int, ...]) -> Candidates:
         """Those not numbered."""
@@ -216,12 +223,19 @@ class DeferredDecisionPolicy:
         if len(answer.unreachable) > 0 and 0 not in answer.unreachable:
             candidates = candidates.without(answer.unreachable)
             answer = self._branch(landing, candidates, memory.parting_time)
-        if len(answer.plans) < 2 or answer.parting_time < view.decision_interval:
+        while self.options.sheds and len(candidates.sites) > 2 and not self._reaches_next_look(answer, view):
+            candidates = candidates.first(len(candidates.sites) - 1)
+            answer = self._branch(landing, candidates, memory.parting_time)
+        if not self._reaches_next_look(answer, view):
             return None
         options = planned.options
         sinking = options.terminal_deceleration * options.terminal_periods * view.control_period
         reference = sample_descent(answer.plans[0], sinking, view.control_period, options)
         return _Trunk(reference, answer.parting_time)
+
+    def _reaches_next_look(self, answer: DeferredDecision, view: ScenarioView) -> bool:
+        """Whether there is something to defer, and the trunk lasts until more is known."""
+        return len(answer.plans) >= 2 and answer.parting_time >= view.decision_interval
 
     def _branch(
         self, landing: SoftLanding, candidates: Candidates, parting_time: float | None

@@ -21,6 +21,7 @@ class PolicyEntry:
         summary: what it does, in one line.
         privileged: it sees the true map; every table marks it.
         slow: a decision takes more than about 50 ms; flown only when asked for.
+        rival: rebuilt from the paper of another group; flown only when asked for, by name or as `rivals`.
         preset: setting that it was made for, flown on others only when asked for; None: made for all.
     """
 
@@ -29,8 +30,9 @@ class PolicyEntry:
     summary: str
     privileged: bool = False
     slow: bool = False
+    rival: bool = False
     preset: str | None = None
 
     def belongs_on(self, preset: str) -> bool:
         """Whether tables of a setting hold it without being asked."""
-        return not self.slow and self.preset in (None, preset)
+        return not (self.slow or self.rival) and self.preset in (None, preset)

@@ -61,7 +61,7 @@ class EpisodeStreams:
         return entropy
 
     def _seed(self, *key: int) -> Words:
-        """Words of a seed as SeedSequence puts them together: the shared ones, filled up with zeros, then the key."""
+        """Words of a seed as SeedSequence has them: the shared ones, filled up with zeros, then the key."""
         entropy = self._entropy
         return np.array([*entropy, *[0] * (POOL - len(entropy)), *key], dtype=np.uint32)
 

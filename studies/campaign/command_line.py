@@ -32,7 +32,8 @@ def choose_policies(wanted: Sequence[str], preset: str) -> tuple[tuple[str, ...]
     """Names in the order of the registry, each once, and the paths among what was asked for.
 
     Args:
-        wanted: names, paths `package.module:Name`, which are loaded and give a name, `default` or `all`.
+        wanted: names, paths `package.module:Name`, which are loaded and give a name, `default`,
+            `rivals` or `all`.
         preset: setting that they fly on; `default` stands for those that belong there.
 
     Raises:
@@ -42,6 +43,7 @@ def choose_policies(wanted: Sequence[str], preset: str) -> tuple[tuple[str, ...]
         raise ValueError("policies must name at least one policy")
     groups = {
         "all": policy_names(),
+        "rivals": tuple(name for name in policy_names() if policy_entry(name).rival),
         "default": tuple(name for name in policy_names() if policy_entry(name).belongs_on(preset)),
     }
     chosen = {name for entry in wanted for name in groups.get(entry) or (policy_entry(entry).name,)}

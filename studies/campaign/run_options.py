@@ -54,8 +54,9 @@ class RunOptions(FolderOptions):
     """Options of a run that flies policies; a command adds its own, and describes those that differ there.
 
     Attributes:
-        policies: names of policies; `default` is every one that is not slow and not made for another
-            preset; `package.module:Name` is your own.
+        policies: names of policies; `default` is every one that is not slow, not made for another
+            preset and no rival, `rivals` those rebuilt from the papers of others;
+            `package.module:Name` is your own.
         episodes: episodes per policy.
         study_seed: seed of the study; equal seeds give equal episodes.
         split: tile split: validation or fresh.

@@ -55,9 +55,9 @@ class Comparison(KeepingOptions):
 
     Attributes:
         episodes: episodes per policy, at least 1.
-        policies: names of policies; `default` is every one that is not slow and not made for another
-            preset, `all` is every one; `package.module:Name` is a policy of your own, checked
-            against the contract first.
+        policies: names of policies; `default` is every one that is not slow, not made for another
+            preset and no rival, `rivals` those rebuilt from the papers of others, `all` every one;
+            `package.module:Name` is a policy of your own, checked against the contract first.
         preset: the setting: paper, hard, partial, lidar, lidar-coarse or navigated.
         study_seed: seed of the study; equal seeds give equal episodes.csv and table.csv.
         split: tile split: validation or fresh to evaluate, tuning for choices.

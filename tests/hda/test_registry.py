@@ -143,6 +143,15 @@ def test_a_policy_made_for_a_preset_belongs_there_alone(monkeypatch):
     assert choose_policies(("mine",), "paper")[0] == ("mine",)
 
 
+def test_a_rival_flies_when_it_is_asked_for():
+    rivals = choose_policies(("rivals",), "paper")[0]
+    assert {"alhat", "reachability-steering", "adaptive-deferred-decision", "nearest-safe+apollo"} <= set(
+        rivals
+    )
+    assert not set(rivals) & set(choose_policies(("default",), "paper")[0])
+    assert set(rivals) <= set(choose_policies(("all",), "paper")[0])
+
+
 def test_registries_know_nothing_of_one_another(policies):
     other = policies.copy()
     other.register(PolicyEntry("mine", lambda: nominal("mine"), "a policy of one's own"))

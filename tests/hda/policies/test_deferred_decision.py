@@ -1,11 +1,12 @@
 """The deferred-decision policy: its candidates, when it commits, and that it lands."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
-from hda.flight.episode import begin_flight, fly, observe
+from hda.flight.episode import advance, begin_flight, fly, observe
 from hda.policies.beliefs.surroundings import infer_unseen
 from hda.policies.deferred_decision import Candidates, DeferredDecisionOptions, DeferredDecisionPolicy
 from hda.policies.hazard_aware import fuse_look, landing_spread
@@ -17,12 +18,14 @@ def test_chances_are_those_of_the_first_safe_candidate():
     candidates = Candidates(np.zeros((3, 3)), np.array([0.9, 0.5, 1.0]))
     np.testing.assert_allclose(candidates.chances, [0.9, 0.05, 0.05])
     assert candidates.without((1,)).sites.shape == (2, 3)
+    np.testing.assert_array_equal(candidates.first(2).probability, [0.9, 0.5])
 
 
 @pytest.mark.parametrize("field", ["candidates", "nodes", "dispersion", "keep_probability", "budget"])
 def test_an_option_that_means_nothing_is_named(field):
+    options: dict[str, Any] = {field: -1}
     with pytest.raises(ValueError, match=field):
-        DeferredDecisionOptions(**{field: -1})
+        DeferredDecisionOptions(**options)
 
 
 def test_it_defers_from_high_up_commits_once_and_lands_softly():
@@ -47,6 +50,37 @@ def test_without_a_budget_or_another_candidate_there_is_nothing_to_defer():
         policy = DeferredDecisionPolicy(options=options)
         _, after = policy.decide(observation, policy.begin(scenario.view, np.random.default_rng(0)))
         assert after.committed
+
+
+def test_a_policy_that_sheds_keeps_two_open_where_the_trunk_to_all_parts_too_early():
+    scenario = sample_scenario("paper", 5, 3, "tuning")
+    observation = observe(scenario, begin_flight(scenario))
+    committed = {}
+    for count, sheds in ((7, False), (7, True), (2, False)):
+        policy = DeferredDecisionPolicy(options=DeferredDecisionOptions(candidates=count, sheds=sheds))
+        _, after = policy.decide(observation, policy.begin(scenario.view, np.random.default_rng(0)))
+        committed[count, sheds] = after.committed
+    assert committed == {(7, False): True, (7, True): False, (2, False): False}
+    record = fly(DeferredDecisionPolicy(options=DeferredDecisionOptions(candidates=7, sheds=True)), scenario)
+    assert record.outcome.success
+    assert record.fallbacks == 0
+
+
+@pytest.mark.parametrize("episode", range(2))
+def test_shedding_never_commits_where_keeping_all_would_not(episode):
+    scenario = sample_scenario("paper", 5, episode, "tuning")
+    keeps, sheds = (
+        DeferredDecisionPolicy(options=DeferredDecisionOptions(sheds=sheds)) for sheds in (False, True)
+    )
+    memory, flight = keeps.begin(scenario.view, np.random.default_rng(0)), begin_flight(scenario)
+    while not memory.committed:
+        look, before = observe(scenario, flight), memory
+        decision, memory = keeps.decide(look, before)
+        other, after = sheds.decide(look, before)
+        assert memory.committed or not after.committed
+        if not memory.committed:
+            np.testing.assert_array_equal(decision.site, other.site)
+        flight = advance(scenario, flight, decision).flight
 
 
 def test_a_site_committed_to_is_left_where_the_filter_scatters_the_landing_over_a_hazard():
