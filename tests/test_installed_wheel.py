@@ -74,6 +74,7 @@ RUNS: dict[str, tuple[list[str], list[str]]] = {
     ),
     "studies.memory": (["--train", "list"], []),
     "studies.results": (["--list"], []),
+    "studies.rigid_plans": (["--starts", "1", "--out", "turned"], ["turned/table.csv"]),
     "studies.robustness": (
         [*SMALL, "--levels", "1", "--factors", "thrust-error", "--policies", "no-divert", "--out", "swept"],
         ["swept/thrust-error.png"],

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
@@ -13,6 +13,7 @@ from guidance.descent.limits import Cone, Limits
 from guidance.descent.plan import GuidanceError, Plan
 from guidance.descent.residuals import RESIDUAL_UNITS
 from guidance.lander import Lander
+from guidance.pdg.body_command import BodyOptions, describe_body, plan_body
 from guidance.pdg.solve import DEFAULT_NODES, PlanningMethod, solve_pdg
 
 
@@ -46,6 +47,8 @@ class PdgCommand:
         unreachable: Fail, or land at the reachable point nearest to the target.
         landing_error_weight: Minimise propellant plus this [kg/m] times the landing error.
         plot: File to draw the plan into, such as plan.png.
+        six_dof: Plan for a rigid body that must turn to thrust elsewhere.
+        body: That body, and how it stands at the start.
     """
 
     state: tuple[float, float, float, float, float, float, float]
@@ -71,6 +74,8 @@ class PdgCommand:
     unreachable: Literal["raise", "nearest"] = "raise"
     landing_error_weight: float | None = None
     plot: Path | None = None
+    six_dof: bool = False
+    body: BodyOptions = field(default_factory=BodyOptions)
 
     @property
     def limits(self) -> Limits:
@@ -84,20 +89,24 @@ class PdgCommand:
             thrust_rate=self.thrust_rate_limit,
         )
 
-    def solve(self) -> Plan:
-        """The plan that the command asks for; raises what `solve_pdg` raises."""
+    @property
+    def lander(self) -> Lander:
+        """Engine and tank."""
         pointing = self.pointing_limit_deg
-        lander = Lander(
+        return Lander(
             dry_mass=self.dry_mass,
             max_thrust=self.max_thrust,
             specific_impulse=self.specific_impulse,
             min_thrust=self.min_thrust,
             pointing_limit=None if pointing is None else math.radians(pointing),
         )
+
+    def solve(self) -> Plan:
+        """The plan of a point mass that the command asks for; raises what `solve_pdg` raises."""
         return solve_pdg(
             self.state,
             self.target,
-            lander=lander,
+            lander=self.lander,
             gravity=self.gravity,
             angular_velocity=self.angular_velocity,
             limits=self.limits,
@@ -133,6 +142,26 @@ def describe(plan: Plan) -> str:
     )
 
 
+def _run(command: PdgCommand) -> str:
+    """Plan, draw, and say what was planned."""
+    plan = command.solve()
+    if command.plot is not None:
+        from guidance.descent.picture import save_plan_figure
+
+        save_plan_figure(plan, command.plot)
+    return describe(plan)
+
+
+def _run_body(command: PdgCommand) -> str:
+    """The same for a body that must turn."""
+    plan = plan_body(command, command.lander, command.limits)
+    if command.plot is not None:
+        from guidance.rigid_descent.picture import save_rigid_figure
+
+        save_rigid_figure(plan, command.plot)
+    return describe_body(plan)
+
+
 def main(arguments: list[str] | None = None) -> None:
     """Run the command; exit status 1 without a flight, 2 for a wrong argument."""
     import tyro
@@ -141,16 +170,12 @@ def main(arguments: list[str] | None = None) -> None:
     command = tyro.cli(PdgCommand, args=arguments)
     try:
         with one_line_errors():
-            plan = command.solve()
-            if command.plot is not None:
-                from guidance.descent.picture import save_plan_figure
-
-                save_plan_figure(plan, command.plot)
+            words = _run_body(command) if command.six_dof else _run(command)
     except GuidanceError as error:
         scope = "" if error.plan.certificate is None else f"\nproof: {error.plan.certificate.scope}"
         sys.stderr.write(f"no flight: {error}{scope}\n")
         raise SystemExit(1) from None
-    sys.stdout.write(describe(plan) + "\n")
+    sys.stdout.write(words + "\n")
     if command.plot is not None:
         sys.stdout.write(f"picture         {command.plot}\n")
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 from guidance.arrays import Array
@@ -116,6 +116,16 @@ class RigidPlan:
         if self.nodes == 0:
             raise ValueError(f"a plan with status '{self.status.value}' cannot be flown")
         return fly_rigid_residuals(self.flight, self.problem)
+
+    def checked(self) -> RigidPlan:
+        """This plan where, flown, it keeps its limits; else LIMIT_REACHED without a flight."""
+        if self.keeps_limits:
+            return self
+        name, excess = max(self.residuals.excess(self.problem).items(), key=lambda item: item[1])
+        words = (
+            f"flown, the plan leaves its limits: {name} {excess:.1f} times what is allowed; try more nodes"
+        )
+        return replace(self, status=PlanStatus.LIMIT_REACHED, flight=no_flight(), message=words)
 
     @cached_property
     def keeps_limits(self) -> bool:

@@ -1,7 +1,7 @@
 """The descent of a rigid body by successive convexification: `solve_pdg_6dof`.
 
-It asks `guidance.pdg` for the point mass's plan to start from, and Clarabel for every programme. No module of
-it imports `guidance.reference`, which holds no planner of rigid bodies yet.
+It asks `guidance.pdg` for the point mass's plan to start from, and Clarabel for every programme. Only `solve`
+imports the reference planner, which a caller may ask for in its place.
 """
 
 from typing import TYPE_CHECKING

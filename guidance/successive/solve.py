@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,15 +15,17 @@ from guidance.descent.problem import LandingProblem
 from guidance.pdg import solve_pdg
 from guidance.rigid_body.body import DEFAULT_BODY, RigidBody
 from guidance.rigid_body.state import RigidState
+from guidance.rigid_descent.first_guess import easily_followed, guess_flight
 from guidance.rigid_descent.plan import RigidPlan
 from guidance.rigid_descent.problem import RigidLandingProblem
 from guidance.state import State
-from guidance.successive.first_guess import easily_followed, guess_flight
 from guidance.successive.iteration import Ending, iterate_programmes
 from guidance.successive.units import Iterate, RigidUnits
-from guidance.validation import finite_vector
+from guidance.validation import finite_vector, unknown_name
 
 METHOD = "successive"
+RigidPlanningMethod = Literal["successive", "casadi"]
+"""Who plans: successive convexification, or the independent reference."""
 DEFAULT_NODES = 31
 """Nodes of a plan unless asked otherwise."""
 _FEWEST_NODES = 5
@@ -39,12 +42,13 @@ def solve_pdg_6dof(
     free_attitude: bool = False,
     objective: str = "propellant",
     nodes: int = DEFAULT_NODES,
+    method: RigidPlanningMethod = "successive",
     throw: bool = True,
 ) -> RigidPlan:
     """Plan a descent that ends upright and at rest, within the body's thrust, torque, rate and tilt limits.
 
     By successive convexification on Clarabel, with a virtual control, a penalised trust region and free time
-    of flight (Szmuk and Acikmese, AIAA 2018-0617), from a point mass's plan. It is a local method: an
+    of flight (Szmuk and Acikmese, AIAA 2018-0617), from a point mass's plan. Both methods are local: an
     OPTIMAL plan is a local optimum on its mesh, and `plan.relaxation_gap` bounds what a better one saves.
 
     Args:
@@ -57,6 +61,7 @@ def solve_pdg_6dof(
         free_attitude: whether the attitude at the start is free.
         objective: 'propellant', or 'time' for the shortest flight.
         nodes: N, for N - 1 equal intervals.
+        method: 'successive', or 'casadi' for the independent reference: collocation, by IPOPT.
         throw: raise where there is no flight; otherwise return a plan that says why.
 
     Returns:
@@ -82,7 +87,9 @@ def solve_pdg_6dof(
         free_attitude,
         objective,
     )
-    plan = _plan(problem, int(nodes))
+    if method not in get_args(RigidPlanningMethod):
+        raise ValueError(unknown_name("method", method, get_args(RigidPlanningMethod)))
+    plan = _plan(problem, int(nodes), method)
     if throw and not plan.status.has_flight:
         raise _error(plan)
     return plan
@@ -98,18 +105,24 @@ def _error(plan: RigidPlan) -> InfeasibleError | SolverFailedError:
     )
 
 
-def _plan(problem: RigidLandingProblem, nodes: int) -> RigidPlan:
+def _plan(problem: RigidLandingProblem, nodes: int, method: RigidPlanningMethod) -> RigidPlan:
     easy = _plan_point(problem.point_mass)
     if not easy.status.has_flight:
         words = f"the point mass has no plan ({easy.message})"
-        return RigidPlan(easy.status, problem, METHOD, message=words, point_mass=easy, solves=easy.solves)
+        return RigidPlan(easy.status, problem, method, message=words, point_mass=easy, solves=easy.solves)
     lead, solves = easy, easy.solves
     followed = easily_followed(problem)
     if followed.lander != easy.problem.lander:
         other = _plan_point(followed)
         lead, solves = other if other.status.has_flight else easy, solves + other.solves
+    first = guess_flight(problem, lead, nodes)
+    if method == "casadi":
+        from guidance.reference import plan_rigid_casadi
+
+        plan = plan_rigid_casadi(problem, first)
+        return replace(plan, point_mass=easy, solves=solves + plan.solves)
     units = RigidUnits.of(problem)
-    guess = Iterate.of_flight(guess_flight(problem, lead, nodes), problem, units)
+    guess = Iterate.of_flight(first, problem, units)
     ending = iterate_programmes(problem, units, guess)
     return _judge(problem, units, replace(ending, solves=solves + ending.solves), easy)
 
@@ -133,9 +146,4 @@ def _judge(problem: RigidLandingProblem, units: RigidUnits, ending: Ending, easy
         words = ending.words
         return RigidPlan(ending.status, problem, METHOD, message=words, point_mass=easy, solves=solves)
     flight = ending.iterate.flight(problem, units)
-    plan = RigidPlan(PlanStatus.OPTIMAL, problem, METHOD, flight, "optimal", easy, solves)
-    if plan.keeps_limits:
-        return plan
-    name, excess = max(plan.residuals.excess(problem).items(), key=lambda item: item[1])
-    words = f"flown, the plan leaves its limits: {name} {excess:.1f} times what is allowed; try more nodes"
-    return RigidPlan(PlanStatus.LIMIT_REACHED, problem, METHOD, message=words, point_mass=easy, solves=solves)
+    return RigidPlan(PlanStatus.OPTIMAL, problem, METHOD, flight, "optimal", easy, solves).checked()

@@ -3,12 +3,14 @@
 import math
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from guidance import Cone, Limits, solve_pdg
+from guidance import Cone, Limits, solve_pdg, solve_pdg_6dof
 from guidance.pdg.__main__ import main
+from guidance.rigid_body import DEFAULT_BODY
 
 STATE = ["--state", "200", "100", "950", "-8", "-4", "-30", "1200", "--target", "0", "0", "50"]
 ROOT = Path(__file__).parents[3]
@@ -93,3 +95,50 @@ def test_example_runs():
     )
     assert "free time" in done.stdout
     assert "nearest soft landing" in done.stdout
+
+
+def test_a_body_that_must_turn_is_planned_and_drawn(capsys, tmp_path):
+    picture = tmp_path / "body.png"
+    main(
+        [
+            *STATE,
+            "--six-dof",
+            "--nodes",
+            "31",
+            "--body.torque-limit",
+            "90",
+            "90",
+            "90",
+            "--plot",
+            str(picture),
+        ]
+    )
+    out = capsys.readouterr().out
+    body = replace(DEFAULT_BODY, torque_limit=(90.0, 90.0, 90.0))
+    plan = solve_pdg_6dof([float(number) for number in STATE[1:8]], (0.0, 0.0, 50.0), body)
+    assert "optimal (successive)" in out
+    assert f"{plan.propellant:.3f} kg" in out
+    assert f"relaxation gap  {plan.relaxation_gap:.3f} kg" in out
+    assert picture.stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [
+        (["--speed-limit", "30"], "speed_limit"),
+        (["--method", "cvxpy"], "method"),
+        (["--nodes", "4"], "nodes"),
+    ],
+)
+def test_what_only_a_point_mass_takes_is_refused_with_a_body(words, named, capsys):
+    with pytest.raises(SystemExit) as caught:
+        main([*STATE, "--six-dof", *words])
+    assert caught.value.code == 2
+    assert named in capsys.readouterr().err
+
+
+def test_a_body_that_cannot_land_is_refused_with_its_proof(capsys):
+    with pytest.raises(SystemExit) as caught:
+        main([*STATE[:7], "1160", "--target", "0", "0", "50", "--six-dof"])
+    assert caught.value.code == 1
+    assert "proof" in capsys.readouterr().err

@@ -1,0 +1,245 @@
+"""Plans for a body that must turn: both methods of `guidance.solve_pdg_6dof` on the same dispersed starts.
+
+Starts are those of a preset's episodes on the tuning tiles, each to its first target, the body upright and at
+rest. A plan is flown open loop by the true motion; one that misses a limit has no flight. Times are of the
+processor, on one core.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from time import process_time
+from typing import get_args
+
+import numpy as np
+import tyro
+from rich.console import Console
+from rich.progress import track
+
+from guidance import solve_pdg_6dof
+from guidance.console import tolerate_encoding
+from guidance.rigid_body import DEFAULT_BODY
+from guidance.rigid_descent import RigidPlan
+from guidance.successive.solve import DEFAULT_NODES, RigidPlanningMethod
+from guidance.validation import finite_number
+from hda.task.presets import find_preset
+from hda.task.scenario import sample_scenario
+from studies.campaign.command_line import open_folder, resumable
+from studies.campaign.journal import Journal, open_journal
+from studies.campaign.provenance import describe_run, identify_run, write_provenance
+from studies.campaign.run_options import FolderOptions
+from studies.columns import Column, console_table, write_csv, write_markdown
+
+_PRODUCTS = ("plans.csv", "table.csv", "table.md", "provenance.json", "conclusions.txt")
+METHODS: tuple[RigidPlanningMethod, ...] = get_args(RigidPlanningMethod)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RigidPlans(FolderOptions):
+    """Command line of the study.
+
+    Attributes:
+        starts: how many, each planned by both methods.
+        preset: whose start conditions they are drawn from.
+        nodes: of each plan.
+    """
+
+    starts: int = 100
+    preset: str = "paper"
+    nodes: int = DEFAULT_NODES
+    out: Path = Path("results/rigid-plans")
+
+    def __post_init__(self) -> None:
+        """Check every option."""
+        finite_number("starts", self.starts, at_least=1)
+
+
+@dataclass(frozen=True)
+class PlannedStart:
+    """One start planned by one method; numbers are nan without a flight.
+
+    Attributes:
+        start: its number.
+        method: who planned.
+        status: how planning ended.
+        seconds: [s] processor time.
+        propellant: [kg].
+        time_of_flight: [s].
+        relaxation_gap: [kg] above what no point mass undercuts.
+        miss: [m] flown, from the target.
+        speed: [m/s] flown, at the end.
+        solves: programmes, with those of the point mass.
+    """
+
+    start: int
+    method: str
+    status: str
+    seconds: float
+    propellant: float
+    time_of_flight: float
+    relaxation_gap: float
+    miss: float
+    speed: float
+    solves: int
+
+
+@dataclass(frozen=True)
+class MethodRow:
+    """One method over all starts; of flights alone, but for `count` and `seconds`."""
+
+    method: str
+    count: int
+    flights: int
+    seconds: tuple[float, float, float]
+    gap: tuple[float, float]
+    miss: float
+    speed: float
+
+
+PLAN_COLUMNS: tuple[Column[PlannedStart], ...] = (
+    Column("start", "start", lambda p: p.start),
+    Column("method", "method", lambda p: p.method, words=True),
+    Column("status", "status", lambda p: p.status, words=True),
+    Column("cpu_s", "processor", lambda p: p.seconds),
+    Column("propellant_kg", "propellant", lambda p: p.propellant),
+    Column("time_of_flight_s", "time of flight", lambda p: p.time_of_flight),
+    Column("relaxation_gap_kg", "relaxation gap", lambda p: p.relaxation_gap),
+    Column("miss_m", "miss", lambda p: p.miss),
+    Column("speed_m_s", "speed", lambda p: p.speed),
+    Column("solves", "solves", lambda p: p.solves),
+)
+"""Every plan, as plans.csv has it."""
+
+COLUMNS: tuple[Column[MethodRow], ...] = (
+    Column("method", "method", lambda r: r.method, words=True),
+    Column("starts", "starts", lambda r: r.count),
+    Column("flights", "flights", lambda r: r.flights),
+    Column("cpu_s_p50", "processor", lambda r: r.seconds[0], digits=2, unit="s"),
+    Column("cpu_s_p99", "99 %", lambda r: r.seconds[1], digits=2, unit="s"),
+    Column("cpu_s_max", "max", lambda r: r.seconds[2], digits=2, unit="s"),
+    Column("gap_kg_p50", "relaxation gap", lambda r: r.gap[0], digits=3, unit="kg"),
+    Column("gap_kg_max", "max", lambda r: r.gap[1], digits=3, unit="kg"),
+    Column("miss_m_max", "greatest miss", lambda r: r.miss, digits=4, unit="m"),
+    Column("speed_m_s_max", "greatest speed", lambda r: r.speed, digits=5, unit="m/s"),
+)
+"""The methods: table.csv, table.md and the console read this list."""
+
+
+def plan_start(start: int, method: RigidPlanningMethod, options: RigidPlans) -> PlannedStart:
+    """Plan the start of a preset's episode on the tuning tiles to its first target, and fly the plan."""
+    scenario = sample_scenario(options.preset, 0, start, "tuning")
+    begun = process_time()
+    plan = solve_pdg_6dof(
+        scenario.initial_state,
+        scenario.nominal_target,
+        replace(DEFAULT_BODY, lander=scenario.preset.lander),
+        gravity=scenario.preset.gravity,
+        nodes=options.nodes,
+        method=method,
+        throw=False,
+    )
+    return _row(start, method, process_time() - begun, plan)
+
+
+def _row(start: int, method: str, seconds: float, plan: RigidPlan) -> PlannedStart:
+    flown = plan.residuals if plan.nodes else None
+    return PlannedStart(
+        start,
+        method,
+        plan.status.value,
+        seconds,
+        plan.propellant,
+        plan.time_of_flight,
+        plan.relaxation_gap,
+        math.nan if flown is None else flown.landing_position,
+        math.nan if flown is None else flown.landing_velocity,
+        plan.solves,
+    )
+
+
+def plan_all(options: RigidPlans, journal: Journal[PlannedStart]) -> list[PlannedStart]:
+    """Plan every start by each method in turn; what the journal has is not planned again."""
+    for method in METHODS:
+        plan_start(options.starts, method, options)  # compiled and assembled on first use: not counted
+    out = []
+    for start in track(range(options.starts), "plans", transient=True):
+        for method in METHODS:
+            key = (method, start)
+            out.append(journal.finish(key, lambda s=start, m=method: plan_start(s, m, options)))
+    return out
+
+
+def sum_up(method: str, plans: Sequence[PlannedStart]) -> MethodRow:
+    """One method's line."""
+    mine = [plan for plan in plans if plan.method == method]
+    flown = [plan for plan in mine if not math.isnan(plan.propellant)]
+    marks = np.quantile([plan.seconds for plan in mine], (0.5, 0.99, 1.0), method="higher")
+    gaps = [plan.relaxation_gap for plan in flown] or [math.nan]
+    return MethodRow(
+        method,
+        len(mine),
+        len(flown),
+        (float(marks[0]), float(marks[1]), float(marks[2])),
+        (float(np.median(gaps)), max(gaps)),
+        max((plan.miss for plan in flown), default=math.nan),
+        max((plan.speed for plan in flown), default=math.nan),
+    )
+
+
+def conclude(plans: Sequence[PlannedStart]) -> list[str]:
+    """What is not optimal, and how far the methods are apart."""
+    words = []
+    for (method, status), count in sorted(Counter((p.method, p.status) for p in plans).items()):
+        words.append(f"{method}: {count} {status}.")
+    burnt = {(p.method, p.start): p.propellant for p in plans}
+    first, second = METHODS
+    apart = [burnt[first, p.start] - burnt[second, p.start] for p in plans if p.method == first]
+    both = [each for each in apart if not math.isnan(each)]
+    if both:
+        words.append(
+            f"On {len(both)} starts that both planned, {first} burns {min(both):+.3f} to {max(both):+.3f} kg "
+            f"beside {second}, {float(np.median(both)):+.3f} in the median."
+        )
+    return words
+
+
+def study_rigid_plans(options: RigidPlans) -> list[MethodRow]:
+    """Plan, and write tables, every plan, conclusions.txt and provenance.json.
+
+    Raises:
+        ValueError: an option is out of range or names something unknown, or the folder holds another study.
+        OSError: the folder cannot be written.
+    """
+    out, console = open_folder(options.out), Console(width=max(Console().width, 130))
+    decided = {"preset": options.preset, "nodes": options.nodes}
+    find_preset(options.preset)
+    identity = identify_run(Path(__file__), decided)
+    with open_journal(out, PlannedStart, _PRODUCTS, identity, options.existing) as journal:
+        plans = plan_all(options, journal)
+        rows, words = [sum_up(method, plans) for method in METHODS], conclude(plans)
+        write_csv(out / "plans.csv", PLAN_COLUMNS, plans)
+        write_csv(out / "table.csv", COLUMNS, rows)
+        write_markdown(out / "table.md", COLUMNS, rows)
+        (out / "conclusions.txt").write_text("\n".join(words) + "\n")
+        write_provenance(out / "provenance.json", {**describe_run(options), "work": journal.describe()})
+    title = f"a body that must turn: {options.starts} starts of {options.preset}"
+    console.print(console_table(COLUMNS, rows, title))
+    for sentence in words:
+        console.print(f"- {sentence}", markup=False, highlight=False)
+    console.print(f"results in {out}")
+    return rows
+
+
+def main() -> None:
+    """Command line; a wrong option is one line on stderr and exit code 2."""
+    tolerate_encoding()
+    with resumable():
+        study_rigid_plans(tyro.cli(RigidPlans, description=__doc__))
+
+
+if __name__ == "__main__":
+    main()
