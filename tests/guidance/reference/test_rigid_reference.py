@@ -82,7 +82,7 @@ def test_an_agile_body_flies_the_point_mass_case_of_acikmese_and_ploen():
         lander,
         (1500.0, 1500.0, 1500.0),
         1905.0,
-        torque_limit=(2000.0,) * 3,
+        torque_limit=(2000.0, 2000.0, 2000.0),
         rate_limit=1.0,
         tilt_limit=math.pi,
         engine_lag=0.0,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import fields, replace
+from functools import cached_property
 
 import numpy as np
 import pytest
@@ -34,7 +35,7 @@ class WithError(Scenario):
 
     error: np.ndarray
 
-    @property
+    @cached_property
     def navigation_error(self) -> np.ndarray:
         return self.error
 
