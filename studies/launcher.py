@@ -76,7 +76,7 @@ GROUPS: dict[str, dict[str, Command]] = {
     "Measure": {
         "results": Command("studies.results", "MakeResults", "make the tables of docs/results again"),
         "timing": Command("studies.timing.command", "Timing", "planners against one another, by the clock"),
-        "bench": Command("studies.bench", "Bench", "speed of the inner loops"),
+        "bench": Command("studies.bench.command", "Bench", "speed of the inner loops"),
         "scale": Command("studies.scale", "Scale", "episodes a second by the number of workers"),
     },
 }

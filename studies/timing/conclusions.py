@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from studies.speed_ratios import FREE_TO_FIXED_LIMIT
+from studies.bench.speed_ratios import FREE_TO_FIXED_LIMIT
 from studies.timing.gfold_peer import PEER_METHOD
 from studies.timing.measures import Call, Summary
 from studies.timing.methods import FATROP_METHOD, IPOPT_METHOD, OWN_METHOD, PEER_NODES, Method

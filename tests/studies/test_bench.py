@@ -9,8 +9,8 @@ import pytest
 
 from rl.training_libraries import TrainingLibrariesError
 from studies.bench import Bench, bench
+from studies.bench.speed_ratios import COLUMNS, SpeedRatio, measure_ratios
 from studies.columns import Column
-from studies.speed_ratios import COLUMNS, SpeedRatio, measure_ratios
 
 
 def cell(name: str, ratio: SpeedRatio) -> str:
@@ -68,7 +68,7 @@ def test_without_the_libraries_of_training_its_ratio_is_left_out_and_that_is_sai
     def refuse() -> None:
         raise TrainingLibrariesError("training needs torch")
 
-    for module in ("studies.speed_ratios", "studies.bench"):
+    for module in ("studies.bench.speed_ratios", "studies.bench.command"):
         monkeypatch.setattr(f"{module}.require_training_libraries", refuse)
     _, ratios = bench(Bench(episodes=1, repeats=1, out=tmp_path))
     assert "encoding a look" in [ratio.work for ratio in ratios]

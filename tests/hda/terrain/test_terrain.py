@@ -20,7 +20,7 @@ from hda.terrain.generator import TerrainParameters, generate_terrain, terrain_r
 from hda.terrain.islands import IslandField, generate_island_field
 from hda.terrain.rocks import RockPopulation, rock_margin
 from hda.terrain.settings import PAPER_TERRAIN
-from studies.terrain_timing import measure_terrain
+from studies.bench.terrain_timing import measure_terrain
 
 DEFAULT = TerrainParameters()
 SMALL = replace(DEFAULT, size=240)

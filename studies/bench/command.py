@@ -26,14 +26,14 @@ from hda.policy import PrivilegedPolicy
 from hda.registry import make_policy
 from hda.task.scenario import sample_scenario
 from rl.training_libraries import TrainingLibrariesError, require_training_libraries
+from studies.bench.environment_speed import COLUMNS as RATE_COLUMNS
+from studies.bench.environment_speed import NATIVE, SINGLE, StepRate, measure_environments
+from studies.bench.speed_ratios import COLUMNS as RATIO_COLUMNS
+from studies.bench.speed_ratios import SpeedRatio, measure_ratios
+from studies.bench.terrain_timing import measure_terrain
 from studies.campaign.command_line import open_folder
 from studies.campaign.provenance import describe_run, write_provenance
 from studies.columns import Column, console_table, write_csv
-from studies.environment_speed import COLUMNS as RATE_COLUMNS
-from studies.environment_speed import NATIVE, SINGLE, StepRate, measure_environments
-from studies.speed_ratios import COLUMNS as RATIO_COLUMNS
-from studies.speed_ratios import SpeedRatio, measure_ratios
-from studies.terrain_timing import measure_terrain
 
 _BULK, _BULK_CALLS = 2000, 20  # starts of a call, and calls
 
@@ -227,7 +227,3 @@ def main() -> None:
     options = tyro.cli(Bench, description=__doc__)
     with one_line_errors():
         bench(options)
-
-
-if __name__ == "__main__":
-    main()
