@@ -33,7 +33,7 @@ def test_the_picture_shows_every_quantity_with_its_limit(plan):
 def test_unequal_torque_limits_have_a_line_each_on_either_side(plan):
     def limits_of(drawn: RigidPlan) -> list[float]:
         lines = [line for line in panel(drawn, "torque").lines if line.get_linestyle() == "--"]
-        return sorted(float(line.get_ydata()[0]) for line in lines)
+        return sorted(float(np.asarray(line.get_ydata()).flat[0]) for line in lines)
 
     size = DEFAULT_BODY.torque_limit[0]
     assert limits_of(plan) == [-size, size]

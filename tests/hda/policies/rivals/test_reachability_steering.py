@@ -100,9 +100,9 @@ def test_it_judges_ground_by_looks_that_may_be_misplaced():
     scenario = hda.sample_scenario("navigated", 6, 3)
     look = observe(scenario, begin_flight(scenario))
     assert look.covariance is not None
-    look = replace(look, covariance=3.0 * look.covariance)
-    belief = fuse_look(look, scenario.view, None)
-    later = replace(look, index=1, time_to_go=14.0, covariance=0.01 * look.covariance)
+    unsure, sure = 3.0 * look.covariance, 0.03 * look.covariance
+    belief = fuse_look(replace(look, covariance=unsure), scenario.view, None)
+    later = replace(look, index=1, time_to_go=14.0, covariance=sure)
     fused = fuse_look(later, scenario.view, belief)
     judged = judge_ground(fused)
     site, memory = SELECTION.select(later, HazardAwareMemory(scenario.view, belief))
