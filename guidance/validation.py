@@ -48,6 +48,13 @@ def finite_number(
     return number
 
 
+def whole_number(name: str, value: int, at_least: int) -> int:
+    """Return `value` as an int of at least so much; raise ValueError naming `name` otherwise."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < at_least:
+        raise ValueError(f"{name} must be an integer of at least {at_least}, got {value!r}")
+    return int(value)
+
+
 def unknown_name(kind: str, name: object, valid: Iterable[str]) -> str:
     """Say that a name is unknown, with the nearest valid names first."""
     names = sorted(valid)

@@ -27,7 +27,7 @@ from guidance.lander import PAPER_LANDER, Lander
 from guidance.lower_bound.proof import prove_least_propellant
 from guidance.pdg.solve import solve_pdg, with_shorthands
 from guidance.state import State
-from guidance.validation import finite_number
+from guidance.validation import finite_number, whole_number
 
 _CHUNK = 64  # starts that a thread takes at once
 _WEAK = 4e-6  # of the start mass, 4.8 g of 1200 kg: a bound so far below its flight is searched for
@@ -152,9 +152,7 @@ def _no_rows(starts: int, nodes: int) -> _Rows:
 def _node_count(nodes: int | None) -> int:
     if nodes is None:
         return 0
-    if isinstance(nodes, bool) or not isinstance(nodes, int | np.integer) or nodes < _FEWEST_NODES:
-        raise ValueError(f"nodes must be an integer of at least {_FEWEST_NODES}, got {nodes!r}")
-    return int(nodes)
+    return whole_number("nodes", nodes, _FEWEST_NODES)
 
 
 def _thread_count(threads: int | None) -> int:

@@ -103,6 +103,8 @@ class PdgCommand:
 
     def solve(self) -> Plan:
         """The plan of a point mass that the command asks for; raises what `solve_pdg` raises."""
+        if self.body != BodyOptions():
+            raise ValueError("body is for a rigid body: give --six-dof too")
         return solve_pdg(
             self.state,
             self.target,
@@ -154,7 +156,7 @@ def _run(command: PdgCommand) -> str:
 
 def _run_body(command: PdgCommand) -> str:
     """The same for a body that must turn."""
-    plan = plan_body(command, command.lander, command.limits)
+    plan = plan_body(command)
     if command.plot is not None:
         from guidance.rigid_descent.picture import save_rigid_figure
 

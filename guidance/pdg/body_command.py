@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from guidance.descent.limits import Limits
 from guidance.lander import Lander
 from guidance.rigid_body.body import DEFAULT_BODY, RigidBody
 from guidance.rigid_body.state import RigidState
@@ -95,13 +94,8 @@ class BodyOptions:
         return RigidState(point.position, point.velocity, point.mass, attitude, rates, thrust)
 
 
-def plan_body(command: PdgCommand, lander: Lander, limits: Limits) -> RigidPlan:
+def plan_body(command: PdgCommand) -> RigidPlan:
     """The plan that a command with --six-dof asks for.
-
-    Args:
-        command: all its options.
-        lander: what they say of engine and tank.
-        limits: what they say of the path.
 
     Raises:
         ValueError: an option is out of range, or is one of those that only a point mass takes.
@@ -111,17 +105,17 @@ def plan_body(command: PdgCommand, lander: Lander, limits: Limits) -> RigidPlan:
 
     for each in fields(command):
         if each.name not in _TAKEN and getattr(command, each.name) != each.default:
-            raise ValueError(f"{each.name}: --six-dof does not take it")
+            raise ValueError(f"{each.name}: --six-dof does not take it; leave it out")
     if command.method not in ("auto", "casadi"):
         raise ValueError(f"method: --six-dof takes auto or casadi, got {command.method!r}")
     point = State.parse(command.state)
     return solve_pdg_6dof(
         command.body.state_of(point),
         command.target,
-        command.body.body_of(lander, point.mass),
+        command.body.body_of(command.lander, point.mass),
         gravity=command.gravity,
         target_velocity=command.target_velocity,
-        glide_slope_limit=limits.glide_slope,
+        glide_slope_limit=command.limits.glide_slope,
         nodes=command.nodes,
         method="casadi" if command.method == "casadi" else "successive",
     )

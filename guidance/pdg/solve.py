@@ -21,7 +21,7 @@ from guidance.lander import PAPER_LANDER, Lander
 from guidance.pdg.fallbacks import answer
 from guidance.pdg.request import Request
 from guidance.state import State
-from guidance.validation import finite_number
+from guidance.validation import finite_number, whole_number
 
 DEFAULT_NODES = 61
 """Nodes of a plan unless asked otherwise: they cost about 5 g of propellant on the paper's descents."""
@@ -160,8 +160,7 @@ def _error(plan: Plan) -> InfeasibleError | SolverFailedError:
 
 
 def _check_choices(nodes: int, method: str, unreachable: str, guess: Plan | None) -> None:
-    if isinstance(nodes, bool) or not isinstance(nodes, int | np.integer) or nodes < FEWEST_NODES:
-        raise ValueError(f"nodes must be an integer of at least {FEWEST_NODES}, got {nodes!r}")
+    whole_number("nodes", nodes, FEWEST_NODES)
     if method not in METHODS:
         raise ValueError(f"method must be one of {', '.join(METHODS)}, got {method!r}")
     if unreachable not in UNREACHABLE:

@@ -42,10 +42,12 @@ class Arrival:
     acceleration: Array | None = None
 
     def __post_init__(self) -> None:
-        """Refuse what no flight can meet."""
+        """Refuse what no flight can meet; copy the arrays and freeze them."""
         for name in ("position", "velocity", "acceleration"):
             if getattr(self, name) is not None:
-                object.__setattr__(self, name, finite_vector(name, getattr(self, name), 3))
+                vector = finite_vector(name, getattr(self, name), 3)
+                vector.flags.writeable = False
+                object.__setattr__(self, name, vector)
 
 
 @dataclass(frozen=True, eq=False)

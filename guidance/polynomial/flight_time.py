@@ -26,8 +26,8 @@ def cheapest_time_of_flight(
     """Of some times of flight, that of the cheapest polynomial descent that keeps the lander's limits.
 
     A descent keeps them where its thrust at the present mass lies within the engine's greatest and the
-    pointing limit, 5 % of each spared, and where it never passes below the arrival. Where none does, the one
-    that breaks them least is taken.
+    pointing limit, if there is one, 5 % of each spared, and where it never passes below the arrival. Where
+    none does, the one that breaks them least is taken.
 
     Args:
         state: start.
@@ -53,10 +53,11 @@ def cheapest_time_of_flight(
     acceleration = powers[..., : order.size] @ (coefficients[:, 2:] * (order * (order - 1))[:, None])
     thrust = acceleration - gravity
     size = np.linalg.norm(thrust, axis=2)
-    tilt = np.arctan2(np.hypot(thrust[..., 0], thrust[..., 1]), thrust[..., 2]).max(axis=1)
     share = 1.0 - _SPARED
     excess = np.maximum(size.max(axis=1) * state.mass / (share * lander.max_thrust) - 1.0, 0.0)
-    excess += np.maximum(tilt - share * pointing_angle(lander), 0.0)
+    if lander.pointing_limit is not None:
+        tilt = np.arctan2(np.hypot(thrust[..., 0], thrust[..., 1]), thrust[..., 2]).max(axis=1)
+        excess += np.maximum(tilt - share * pointing_angle(lander), 0.0)
     excess += np.maximum(-height.min(axis=(1, 2)) / max(state.position[2] - arrival.position[2], 1.0), 0.0)
     excess[excess < 1e-9] = 0.0
     velocity_change = np.trapezoid(size, dx=1.0 / (_INSTANTS - 1), axis=1) * times

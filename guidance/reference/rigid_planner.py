@@ -1,9 +1,11 @@
 """The least-propellant descent of a rigid body by CasADi and IPOPT: an independent reference.
 
-The motion, its discretisation (collocation in place of multiple shooting), the search (an interior-point
-method on the whole problem in place of programmes about the last flight) and the units are not those of
-`guidance.successive`; only the first guess and the check of the answer are shared. A local method: where it
-fails, nothing is said about feasibility.
+The code of the motion, its discretisation (collocation in place of multiple shooting), the search (an
+interior-point method on the whole problem in place of programmes about the last flight) and the units are not
+those of `guidance.successive`. The first guess and the check of the answer are shared; nodes at equal
+intervals, controls linear between them and the range of the time of flight about the first guess's are chosen
+alike, so that both look for the same optimum. A local method: where it fails, nothing is said about
+feasibility.
 """
 
 from __future__ import annotations

@@ -2,8 +2,9 @@
 
 A node holds (r, v, q, w, m) and the controls (thrust, torque), which are linear in time between nodes; three
 collocation points hold the state within each interval, where the motion is kept exactly. The order of the
-end of an interval is six. Ends and simple limits are bounds on the variables, so that one programme serves
-every start of a body.
+end of an interval is six. Nodes and controls are placed as those of `guidance.successive`; what lies between
+them is not. Ends and simple limits are bounds on the variables, so that one programme serves every start of a
+body.
 
 Source: Biegler, Nonlinear Programming, 2010, chapter 10 (direct collocation).
 """
@@ -25,7 +26,7 @@ POINTS = 3
 """Collocation points of an interval."""
 _MOST_ITERATIONS = 400
 _SMOOTHING = 1e-6  # of full thrust, under the root of a gimballed thrust's size
-_TORQUE_PRICE = 1e-7  # of the square of the torques' mean, so that no two answers burn the same
+_TORQUE_PRICE = 1e-7  # of the torques' mean square: it chooses between answers that burn the same
 
 
 @dataclass(frozen=True)
@@ -241,7 +242,7 @@ def rigid_program(structure: RigidStructure) -> RigidProgram:
         "ipopt.print_level": 0,
         "ipopt.sb": "yes",
         "ipopt.max_iter": _MOST_ITERATIONS,
-        "ipopt.mu_strategy": "monotone",
+        "ipopt.mu_strategy": "monotone",  # of Szmuk's case, along a glide slope, adaptive finds no end
         "ipopt.fixed_variable_treatment": "make_parameter",
     }
     solver = ca.nlpsol("rigid_descent", "ipopt", problem, options)

@@ -44,11 +44,13 @@ def draw_rigid_plan(plan: RigidPlan) -> Figure:
     _draw(panels[0, 2], plan, rates, "rates [deg/s]", np.degrees(body.rate_limit), both=True)
     thrust = np.linalg.norm(plan.thrust, axis=1) / 1e3
     _draw(panels[1, 0], plan, thrust, "thrust [kN]", body.lander.max_thrust / 1e3)
-    _draw(panels[1, 1], plan, plan.torque, "torque [N m]", max(body.torque_limit), both=True)
+    _draw(panels[1, 1], plan, plan.torque, "torque [N m]", body.torque_limit, both=True)
     _draw(panels[1, 2], plan, plan.mass, "mass [kg]", body.lander.dry_mass)
+    gap = plan.relaxation_gap
+    above = "" if np.isnan(gap) else f", {gap:.2f} kg above the bound of a point mass"
     figure.suptitle(
-        f"{plan.status.value}, {plan.method}: {plan.time_of_flight:.2f} s, {plan.propellant:.2f} kg burnt, "
-        f"{plan.relaxation_gap:.2f} kg above what a point mass cannot undercut"
+        f"{plan.status.value}, {plan.method}: {plan.time_of_flight:.2f} s, "
+        f"{plan.propellant:.2f} kg burnt{above}"
     )
     return figure
 
@@ -78,13 +80,23 @@ def _towards_start(offset: Array) -> Array:
     return first / size if size > 1e-6 else np.array([1.0, 0.0])
 
 
-def _draw(axes: Any, plan: RigidPlan, values: Array, label: str, limit: float, both: bool = False) -> None:
-    """One quantity over time, or one line for each body axis, with its limit."""
+def _draw(
+    axes: Any,
+    plan: RigidPlan,
+    values: Array,
+    label: str,
+    limit: float | tuple[float, float, float],
+    both: bool = False,
+) -> None:
+    """One quantity over time, or one line for each body axis, with its limit; unequal ones in its colour."""
     lines = axes.plot(plan.time, values, marker=".", markersize=3)
     for line, name in zip(lines, _AXES if values.ndim > 1 else (), strict=False):
         line.set_label(name)
-    for sign in (1.0, -1.0) if both else (1.0,):
-        axes.axhline(sign * limit, color="tab:red", linestyle="--", linewidth=1.0)
+    limits = np.atleast_1d(limit)
+    colors = ["tab:red"] if (limits == limits[0]).all() else [line.get_color() for line in lines]
+    for each, color in zip(limits, colors, strict=False):
+        for sign in (1.0, -1.0) if both else (1.0,):
+            axes.axhline(sign * each, color=color, linestyle="--", linewidth=1.0)
     axes.set_xlabel("time [s]")
     axes.set_ylabel(label)
     axes.grid(alpha=0.3)

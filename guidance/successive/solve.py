@@ -21,7 +21,7 @@ from guidance.rigid_descent.problem import RigidLandingProblem
 from guidance.state import State
 from guidance.successive.iteration import Ending, iterate_programmes
 from guidance.successive.units import Iterate, RigidUnits
-from guidance.validation import finite_vector, unknown_name
+from guidance.validation import finite_vector, unknown_name, whole_number
 
 METHOD = "successive"
 RigidPlanningMethod = Literal["successive", "casadi"]
@@ -75,8 +75,7 @@ def solve_pdg_6dof(
             the nodes; nothing is proved. `error.plan` is of the type of every planner's: a Plan of the point
             mass without a flight, with this status and message. `throw=False` gives the RigidPlan itself.
     """
-    if isinstance(nodes, bool) or not isinstance(nodes, int | np.integer) or nodes < _FEWEST_NODES:
-        raise ValueError(f"nodes must be an integer of at least {_FEWEST_NODES}, got {nodes!r}")
+    nodes = whole_number("nodes", nodes, _FEWEST_NODES)
     problem = RigidLandingProblem(
         RigidState.parse(state),
         finite_vector("target", target, 3),
@@ -89,7 +88,7 @@ def solve_pdg_6dof(
     )
     if method not in get_args(RigidPlanningMethod):
         raise ValueError(unknown_name("method", method, get_args(RigidPlanningMethod)))
-    plan = _plan(problem, int(nodes), method)
+    plan = _plan(problem, nodes, method)
     if throw and not plan.status.has_flight:
         raise _error(plan)
     return plan

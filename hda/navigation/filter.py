@@ -15,7 +15,7 @@ from guidance.arrays import Array
 from guidance.constants import MOON_GRAVITY
 from guidance.validation import finite_vector
 from hda.navigation.control_period import navigate_path, range_down
-from hda.navigation.layout import ESTIMATED, SIZE, TrueErrors
+from hda.navigation.layout import ESTIMATED, SIZE
 from hda.navigation.navigation_state import NavigationState
 from hda.navigation.sensor_errors import ReadingDraws, SensorErrors
 from hda.navigation.system import NavigationSystem
@@ -48,8 +48,8 @@ def measure_ranges(elevation: NDArray[np.float32], path: Array, errors: SensorEr
     Returns:
         Shape (n,).
     """
-    top = float(np.nanmax(elevation))
-    return np.array([range_down(elevation, row[:3].copy(), errors.tilt, top) for row in path])
+    top, tilt = float(np.nanmax(elevation)), errors.tilt.copy()
+    return np.array([range_down(elevation, row[:3].copy(), tilt, top) for row in path])
 
 
 def navigate(
@@ -89,9 +89,7 @@ def navigate(
     if np.abs(np.diff(time)[:-1] - period).max(initial=0.0) > 1e-6 * period:
         raise ValueError(f"flown: all intervals but the last must be of one control period, {period:g} s")
     memory, before = navigation.memory(), navigation.errors
-    errors = TrueErrors(
-        before.accelerometer_bias.copy(), before.altimeter_bias, before.beam_bias, before.tilt
-    )
+    errors = before.true_errors()
     log = NavigationLog(
         np.empty((periods, ESTIMATED)), np.empty((periods, SIZE, SIZE)), np.empty((periods, 3))
     )

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from guidance.arrays import Array
-from hda.navigation.layout import NORMAL_COLUMNS, UNIFORM_COLUMNS
+from hda.navigation.layout import NORMAL_COLUMNS, UNIFORM_COLUMNS, TrueErrors
 from hda.navigation.system import NavigationSystem
 
 
 @dataclass(frozen=True, eq=False)
 class SensorErrors:
-    """What chance does once an episode.
+    """What chance does once an episode; its arrays are frozen, as all policies of an episode share them.
 
     Attributes:
         accelerometer_bias: [m/s^2] shape (3,), at present; it wanders slowly.
@@ -30,6 +30,17 @@ class SensorErrors:
     tilt: Array
     position: Array
     velocity: Array
+
+    def __post_init__(self) -> None:
+        """Freeze the arrays."""
+        for array in (self.accelerometer_bias, self.beam_bias, self.tilt, self.position, self.velocity):
+            array.flags.writeable = False
+
+    def true_errors(self) -> TrueErrors:
+        """For the kernels, which let the accelerometers' bias wander: arrays of their own."""
+        return TrueErrors(
+            self.accelerometer_bias.copy(), self.altimeter_bias, self.beam_bias.copy(), self.tilt.copy()
+        )
 
 
 def draw_sensor_errors(system: NavigationSystem, rng: np.random.Generator) -> SensorErrors:

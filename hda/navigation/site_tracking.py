@@ -30,7 +30,7 @@ def find_site(
         draws: of this look; a first look is never without its site.
     """
     deviation = _look_deviation(system, position, site)
-    reading = measure_site(site - position, navigation.errors.tilt, deviation, draws.normal)
+    reading = measure_site(site - position, navigation.errors.tilt.copy(), deviation, draws.normal)
     memory = navigation.memory()
     acquire_site(memory, reading, deviation)
     return _close(navigation, memory)
@@ -56,7 +56,7 @@ def track_site(
     if fixes is None or slant < fixes.floor or draws.uniform < fixes.dropout:
         return navigation, float("nan")
     deviation = fixes.deviation(slant)
-    reading = measure_site(site - position, navigation.errors.tilt, deviation, draws.normal)
+    reading = measure_site(site - position, navigation.errors.tilt.copy(), deviation, draws.normal)
     memory, gate = navigation.memory(), float(system.gates[SITE_FIX])
     square = fix_site(memory, reading, deviation, gate, system.patience)
     return _close(navigation, memory), float(square)

@@ -63,6 +63,25 @@ class Lattice(NamedTuple):
     beyond: Array
 
 
+class SafeGround(NamedTuple):
+    """Safe ground [m^2] in reach of a cell: what is known, and what the next look may show besides."""
+
+    known: float
+    unknown: float
+
+
+class Bound(NamedTuple):
+    """What the cheapest cells cost at most.
+
+    Attributes:
+        most: [kg] not less than the least J and `within` together.
+        within: [kg] so much above the least J is priced in full.
+    """
+
+    most: float
+    within: float
+
+
 class Outlook(NamedTuple):
     """The next look, and integral images of the known and of the unknown safe ground."""
 
@@ -159,15 +178,15 @@ def _weigh(
     lattice: Lattice,
     prices: Prices,
     cell: tuple[int, int],
-    ground: tuple[float, float],
+    ground: SafeGround,
 ) -> float:
-    """J of one cell with so much known and unknown safe ground [m^2] in reach."""
+    """J of one cell (row, column) with so much safe ground in reach."""
     row, column = cell
     i, s = lattice.point[row], lattice.beyond[row]
     price = (1.0 - s) * lattice.rows[i, column] + s * lattice.rows[i + 1, column]
     risk = 1.0 - landing_chance(safe, prices.dispersion, row, column)
-    exponent = ground[0] / prices.surprise_area
-    exponent += ground[1] / prices.island_area
+    exponent = ground.known / prices.surprise_area
+    exponent += ground.unknown / prices.island_area
     return price + risk * (prices.divert + prices.failure * math.exp(-exponent))
 
 
@@ -175,13 +194,14 @@ def _weigh(
 def price_best(
     safe: NDArray[np.float32], next_look: NextLook, lattice: Lattice, prices: Prices, column: int
 ) -> float:
-    """J of the cell of a column that is cheapest where no later look helps: a bound on the least J.
+    """J of one good cell, which the least J does not exceed.
 
-    It is summed without integral images, which the bound spares in most rows.
+    It is the cell of a column whose J would be the least if no later look helped. Its safe ground is summed
+    cell by cell, as the integral images are made only after it: for the rows that this bound leaves.
     """
     n, least, row = safe.shape[0], np.inf, 0
     for k in range(n):
-        price = _weigh(safe, lattice, prices, (k, column), (0.0, 0.0))
+        price = _weigh(safe, lattice, prices, (k, column), SafeGround(0.0, 0.0))
         if price < least:
             least, row = price, k
     divert, half_width = _divert_widths(next_look, prices, row, column)
@@ -197,7 +217,7 @@ def price_best(
                 and (j + 0.5 - next_look.east) ** 2 + (i + 0.5 - next_look.north) ** 2 <= radius_squared
             ):
                 unknown += safe[i, j]
-    return _weigh(safe, lattice, prices, (row, column), (known, unknown))
+    return _weigh(safe, lattice, prices, (row, column), SafeGround(known, unknown))
 
 
 @compile_vector_kernel
@@ -206,10 +226,10 @@ def price_cells(
     outlook: Outlook,
     lattice: Lattice,
     prices: Prices,
-    bound: tuple[float, float],
+    bound: Bound,
     out: Array,
 ) -> None:
-    """Raise to J what may yet cost no more than the least J and an allowance, the rest not above its J.
+    """Fill in J of every cell that may cost no more than the bound; the others keep their lower price.
 
     Each cell that is priced tightens the bound for those after it.
 
@@ -218,7 +238,7 @@ def price_cells(
         outlook: the next look.
         lattice: propellant.
         prices: of the objective.
-        bound: [kg] a price that the least J and the allowance do not exceed together, and the allowance.
+        bound: on what is worth pricing.
         out: [kg] shape (n, n); on entry J if every failure were averted.
     """
     most, within = bound
@@ -230,6 +250,6 @@ def price_cells(
             divert, half_width = _divert_widths(look, prices, row, column)
             known = sum_box(outlook.known, row, column, divert)
             unknown = sum_box(outlook.unknown, row, column, half_width)
-            price = _weigh(safe, lattice, prices, (row, column), (known, unknown))
+            price = _weigh(safe, lattice, prices, (row, column), SafeGround(known, unknown))
             out[row, column] = price
             most = min(most, price + within)

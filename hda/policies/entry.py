@@ -21,7 +21,7 @@ class PolicyEntry:
         summary: what it does, in one line.
         privileged: it sees the true map; every table marks it.
         slow: a decision takes more than about 50 ms; flown only when asked for.
-        rival: rebuilt from the paper of another group; flown only when asked for, by name or as `rivals`.
+        rival: rebuilt from the paper of another group; flown only by name, as `rivals` or with `all`.
         preset: setting that it was made for, flown on others only when asked for; None: made for all.
     """
 

@@ -11,10 +11,23 @@ from guidance.arrays import Array
 from guidance.kernel import compile_vector_kernel
 
 
+def gaussian_shares(deviation: float, reach: int) -> Array:
+    """Chance of a Gaussian to lie in each cell from the middle one to `reach` beside it, and in none beyond.
+
+    Args:
+        deviation: its standard deviation about the middle of a cell, in cells, above zero.
+        reach: at least 0.
+
+    Returns:
+        Shape (reach + 1,), of the cells on one side; both sides together add up to one.
+    """
+    within = np.array([math.erf((k + 0.5) / (deviation * math.sqrt(2.0))) for k in range(reach + 1)])
+    return np.diff(within, prepend=0.0) * np.where(np.arange(reach + 1) == 0, 1.0, 0.5) / within[-1]
+
+
 def dispersion_weights(dispersion: float) -> tuple[float, float, float]:
     """Chance to come down in the row aimed at, and in each of the rows one and two beside it."""
-    edges = np.array([math.erf(edge / (dispersion * math.sqrt(2.0))) for edge in (0.5, 1.5, 2.5)])
-    middle, near, far = (np.diff(edges, prepend=0.0) * np.array([1.0, 0.5, 0.5]) / edges[-1]).tolist()
+    middle, near, far = gaussian_shares(dispersion, 2).tolist()
     return middle, near, far
 
 

@@ -26,6 +26,7 @@ from guidance.two_impulse import divert_cost
 from guidance.validation import finite_number
 from hda.policies.beliefs.belief import GroundBelief
 from hda.policies.cell_prices import (
+    Bound,
     Lattice,
     NextLook,
     Outlook,
@@ -149,5 +150,5 @@ def price_sites(
         first, last, widest = read_part(out, most, next_look, prices)
         known, unknown = (SummedArea(np.empty((last - first + 1, widest + 1)), first, n) for _ in range(2))
         sum_by_likelihood(safe, next_look, known, unknown)
-        price_cells(safe, Outlook(next_look, known, unknown), lattice, prices, (most, within), out)
+        price_cells(safe, Outlook(next_look, known, unknown), lattice, prices, Bound(most, within), out)
     return out

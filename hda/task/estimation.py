@@ -13,7 +13,6 @@ import numpy as np
 
 from guidance.arrays import Array
 from guidance.state import State
-from hda.navigation.layout import TrueErrors
 from hda.navigation.navigation_state import NavigationState, begin_navigation
 from hda.navigation.site_tracking import find_site, move_site, track_site
 from hda.navigation.steering import Sensing
@@ -80,10 +79,9 @@ def open_sensing(
     if numbers is None or navigation is None:
         return None
     draws = scenario.streams.readings(look, scenario.preset.rules.control_periods)
-    errors = navigation.errors
     return Sensing(
         move_site(navigation, site - target),
-        TrueErrors(errors.accelerometer_bias.copy(), errors.altimeter_bias, errors.beam_bias, errors.tilt),
+        navigation.errors.true_errors(),
         draws.normal,
         draws.uniform,
         numbers,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,33 +13,78 @@ from hda.policies.beliefs.measured_readings import HOLE
 UNREAD = -1
 """Class of a cell that no look has read."""
 
-Layers = tuple[NDArray[np.int8], NDArray[np.int8], NDArray[np.int8]]
-"""Classes of the size of the map, of the density of its points and of V_P, shape (n, n) each."""
+
+class ReadingLayers(NamedTuple):
+    """What the cells of a square have read, shape (n, n) each.
+
+    Attributes:
+        size: number of the cell size of the map that the reading is from.
+        density: class of its points.
+        probability: class of V_P.
+    """
+
+    size: NDArray[np.int8]
+    density: NDArray[np.int8]
+    probability: NDArray[np.int8]
+
+
+class MapReadings(NamedTuple):
+    """What a map reads.
+
+    Attributes:
+        number: of its cell size.
+        density: shape (rows, columns), class of its points.
+        probability: shape (rows, columns), class of V_P.
+    """
+
+    number: np.int8
+    density: NDArray[np.int8]
+    probability: NDArray[np.int8]
+
+
+class CellPlaces(NamedTuple):
+    """Row and column of a map that hold a square's rows and columns of cells; many lie beside the map.
+
+    Attributes:
+        rows: shape (n,).
+        columns: shape (n,).
+    """
+
+    rows: NDArray[np.int64]
+    columns: NDArray[np.int64]
+
+
+class LookPlaces(NamedTuple):
+    """How well the looks behind a square are placed; both arrays are empty where no look errs.
+
+    Attributes:
+        share: shape (rows, columns), of the points of the map's cells those of the newest look.
+        variance: [m^2] shape (n, n), of the square's cells.
+        newest: [m^2] of the newest look.
+    """
+
+    share: NDArray[np.float32]
+    variance: NDArray[np.float32]
+    newest: np.float32
 
 
 @compile_kernel
-def keep_better(
-    places: tuple[NDArray[np.int64], NDArray[np.int64]],
-    found: tuple[NDArray[np.int8], NDArray[np.int8], np.int8],
-    kept: Layers,
-    placement: tuple[NDArray[np.float32], NDArray[np.float32]],
-    misplaced: np.float32,
-) -> None:
-    """Let each cell of a square keep the better of its reading and that of a map.
+def keep_better(cells: CellPlaces, found: MapReadings, kept: ReadingLayers, places: LookPlaces) -> None:
+    """Replace the reading of each cell of a square by that of a map, where the map's is the better.
+
+    It is where the cell has no reading, one of the same or of larger cells of a map, or a hole and the map
+    none. A hole is never better than what larger cells know.
 
     Args:
-        places: shape (n,) each, row and column of the map that hold the square's rows and columns of cells;
-            many lie beside the map.
-        found: of the map: classes of V_P and of density, shape (rows, columns), and number of its cell size.
-        kept: the square's classes of size, density and V_P, shape (n, n); changed in place.
-        placement: share of the points of the map's cells that are the newest look's, and [m^2] shape (n, n),
-            variance of the looks' places, which is changed in place; both empty where no look errs.
-        misplaced: [m^2] that of the newest look.
+        cells: of the map, under those of the square.
+        found: the map's readings.
+        kept: the square's; changed in place.
+        places: of the looks; the variance is changed in place.
     """
-    rows, columns = places
-    reading, density, number = found
+    rows, columns = cells
+    number, density, reading = found
     sizes, densities, readings = kept
-    share, variance = placement
+    share, variance, misplaced = places
     for i in range(rows.size):
         if not 0 <= rows[i] < reading.shape[0]:
             continue
@@ -59,7 +106,7 @@ def keep_better(
 
 @compile_kernel
 def look_up(
-    classes: Layers, shares: NDArray[np.float32], prior: np.float32, out: NDArray[np.float32]
+    classes: ReadingLayers, shares: NDArray[np.float32], prior: np.float32, out: NDArray[np.float32]
 ) -> None:
     """Share of safe ground in the classes of each cell of a square; the prior where none was read."""
     sizes, densities, readings = classes

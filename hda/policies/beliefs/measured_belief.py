@@ -15,7 +15,15 @@ from numpy.typing import NDArray
 
 from guidance.arrays import Array
 from hda.policies.beliefs.belief import LEVEL_SHARES, LEVELS, CellSquare
-from hda.policies.beliefs.kept_readings import UNREAD, keep_better, look_up
+from hda.policies.beliefs.kept_readings import (
+    UNREAD,
+    CellPlaces,
+    LookPlaces,
+    MapReadings,
+    ReadingLayers,
+    keep_better,
+    look_up,
+)
 from hda.policies.beliefs.measured_readings import DENSITY_EDGES, HOLE, PROBABILITY_EDGES, safe_shares
 from hda.policies.beliefs.placement_error import Placement
 from hda.safety.criteria import SafetyCriteria
@@ -77,7 +85,7 @@ class MeasuredBelief:
         percentile: float | None,
         misplaced: float = 0.0,
     ) -> MeasuredBelief:
-        """The belief after one more look.
+        """The belief after one more look; one that measured nothing leaves it as it was, places and all.
 
         Args:
             ground: what was measured.
@@ -93,17 +101,18 @@ class MeasuredBelief:
             ground = assess_elevation(fuse_elevations(before, ground.elevation, percentile), criteria)
         reading, density = classify_readings(ground, criteria)
         axis = np.arange(self.side, dtype=np.float64) + 0.5
-        rows = ground.grid.rows_of(self.corner[1] + axis)
-        columns = ground.grid.columns_of(self.corner[0] + axis)
-        kept = self.size_class.copy(), self.density_class.copy(), self.probability_class.copy()
-        placement, places = None, (_NOTHING, _NOTHING)
+        cells = CellPlaces(
+            ground.grid.rows_of(self.corner[1] + axis), ground.grid.columns_of(self.corner[0] + axis)
+        )
+        kept = ReadingLayers(self.size_class.copy(), self.density_class.copy(), self.probability_class.copy())
+        placement, places = None, LookPlaces(_NOTHING, _NOTHING, np.float32(misplaced))
         if misplaced > 0.0 or self.placement is not None:
             newer = place_on(ground.grid, scan).count / np.maximum(ground.elevation.count, 1)
             before_look = self.placement or Placement.blank(self.side)
             placement = Placement(before_look.variance.copy(), misplaced)
-            places = newer.astype(np.float32), placement.variance
-        number = np.int8(PIXEL_SIZES.index(size))
-        keep_better((rows, columns), (reading, density, number), kept, places, np.float32(misplaced))
+            places = LookPlaces(newer.astype(np.float32), placement.variance, np.float32(misplaced))
+        found = MapReadings(np.int8(PIXEL_SIZES.index(size)), density, reading)
+        keep_better(cells, found, kept, places)
         elevations = self.elevations | {size: ground.elevation}
         return MeasuredBelief(self.square, *kept, elevations, placement)
 
@@ -111,7 +120,8 @@ class MeasuredBelief:
         """Shape (n, n), share of safe ground among cells that read as each does; the prior where unread."""
         prior = np.float32(LEVEL_SHARES[LEVELS.size // 2 :].sum() / LEVEL_SHARES.sum())
         out = np.empty((self.side, self.side), dtype=np.float32)
-        look_up((self.size_class, self.density_class, self.probability_class), safe_shares(), prior, out)
+        layers = ReadingLayers(self.size_class, self.density_class, self.probability_class)
+        look_up(layers, safe_shares(), prior, out)
         return out
 
     def cell(self, site: Array) -> tuple[int, int] | None:

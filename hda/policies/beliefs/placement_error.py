@@ -1,10 +1,13 @@
 """What a belief loses because its looks were not placed where they belong.
 
 A look is placed by the lander's estimate of that moment. What it shows at a cell is the ground of another
-place, off by the error of that estimate. Of an optimal filter the newest error is uncorrelated with what the
-estimate was corrected by since, so that the variance between an earlier look and the newest is the
-difference of the two that the filter stated. What is left between the newest look and the touchdown is
-counted where a landing is priced (`hda.policies.hazard_aware.landing_spread`).
+place, off by the error of that estimate. Between an earlier look and the newest its variance is taken as the
+difference of the two that the filter stated, p_k - p_n. That assumes an optimal filter, whose newest error is
+uncorrelated with what it was corrected by since, and an error that does not move by itself. It does move
+between fixes, with velocity and the inertial unit, so that the difference says too little. Where p_n is the
+greater, as below `SiteFixes.floor`, where no fix is taken, the look is not blurred at all. What is left
+between the newest look and the touchdown is counted where a landing is priced
+(`hda.policies.hazard_aware.landing_spread`).
 
 The probability that a cell is safe is then the mean over the cells around it, with the normal distribution's
 weights. The absolute error of the position does not come in: it moves all looks, and the lander, alike.
@@ -26,7 +29,7 @@ from hda.task.observation import Observation
 _STEP = 0.05
 """[m] to which a deviation is rounded: weights are made once for each."""
 _WIDEST = 2.5
-"""[m] greatest deviation; there is no look whose place is known worse."""
+"""[m] greatest deviation; greater ones are taken as this."""
 _REACH = 9
 """Cells on each side over which the mean is taken at most: 3.8 deviations of the widest."""
 _LEAST_WEIGHT = 1e-6
@@ -47,7 +50,7 @@ class Placement:
     Attributes:
         variance: [m^2] shape (n, n), along each horizontal axis, of the looks behind each cell; where points
             of several lie in one cell, the mean over the points.
-        newest: [m^2] of the newest look.
+        newest: [m^2] of the newest look that showed ground.
     """
 
     variance: NDArray[np.float32] = field(repr=False)
@@ -61,8 +64,8 @@ class Placement:
     def blurred(self, safe: NDArray[np.float32]) -> NDArray[np.float32]:
         """Probability that each cell is safe, shape (n, n), where `safe` was read from misplaced looks.
 
-        Along rows first, then along columns, each cell with its own deviation relative to the newest look, of
-        up to 2.5 m.
+        Along rows first, then along columns, each cell with its own deviation relative to the newest look: 0
+        where the newest is placed worse, and at most 2.5 m.
         """
         number = np.empty(safe.shape, dtype=np.int8)
         if not number_deviations(self.variance, np.float32(self.newest), number):
@@ -91,13 +94,13 @@ def cell_weights() -> Array:
 @compile_vector_kernel
 def number_deviations(variance: NDArray[np.float32], newest: np.float32, number: NDArray[np.int8]) -> bool:
     """Fill the row of `cell_weights` for each cell: whether any is not the first."""
-    most, step, most_bits = np.float32(_WIDEST), np.float32(1.0 / _STEP), np.int8(0)
+    most, step, bits = np.float32(_WIDEST), np.float32(1.0 / _STEP), np.int8(0)
     for i in range(variance.shape[0]):
         for j in range(variance.shape[1]):
             deviation = math.sqrt(max(variance[i, j] - newest, np.float32(0.0)))
             number[i, j] = np.int8(min(deviation, most) * step + np.float32(0.5))
-            most_bits |= number[i, j]
-    return most_bits != 0
+            bits |= number[i, j]
+    return bits != 0
 
 
 @compile_kernel

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from guidance.arrays import Array
+from hda.policies.landing_dispersion import gaussian_shares
 
 
 def smooth_map(safety: Array, dispersion: float) -> Array:
@@ -21,12 +22,10 @@ def smooth_map(safety: Array, dispersion: float) -> Array:
     """
     if dispersion <= 0.0:
         return safety
-    reach = np.arange(math.ceil(3.0 * dispersion) + 1)
-    within = np.array([math.erf((k + 0.5) / (dispersion * math.sqrt(2.0))) for k in reach])
-    share = np.diff(within, prepend=0.0) * np.where(reach == 0, 1.0, 0.5) / within[-1]
+    share = gaussian_shares(dispersion, math.ceil(3.0 * dispersion))
     out = safety
     for _ in range(2):  # along the rows, then along the columns
         cells = np.arange(out.shape[1])
         apart = np.abs(np.subtract.outer(cells, cells))
-        out = (out @ np.where(apart < reach.size, share[np.minimum(apart, reach.size - 1)], 0.0)).T
+        out = (out @ np.where(apart < share.size, share[np.minimum(apart, share.size - 1)], 0.0)).T
     return out

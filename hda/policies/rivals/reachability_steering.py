@@ -11,7 +11,8 @@ Deviations. The paper on this law could not be read; what it maximises is from t
 Ou and Ozaki (ISSFD, 2026). Safety is the belief from all looks of `hazard_aware`, which is not theirs (they
 process a Gaussian elevation map, arXiv 2409.09309). Reach is by the propellant of the two-impulse estimate,
 with a share kept in reserve, and not by a learnt or convex set. The lander is taken to fly ZEM/ZEV 6/2 to the
-target until the next look, undisturbed. When to choose the site is not known; it is set on tuning episodes.
+target until the next look, undisturbed, whichever law it is composed with. When to choose the site is not
+known; it is set on tuning episodes.
 """
 
 from __future__ import annotations
@@ -26,10 +27,15 @@ from guidance.polynomial.descent_polynomial import Arrival, meet_arrival
 from guidance.state import State
 from guidance.two_impulse import divert_cost
 from guidance.upright_time import upright_time_to_go
-from guidance.validation import finite_number
+from guidance.validation import finite_number, whole_number
 from hda.policies.beliefs.belief import GroundBelief
-from hda.policies.beliefs.surroundings import infer_unseen
-from hda.policies.hazard_aware import HazardAwareMemory, fuse_look, landing_spread, load_kernels
+from hda.policies.hazard_aware import (
+    HazardAwareMemory,
+    fuse_look,
+    judge_ground,
+    landing_spread,
+    load_kernels,
+)
 from hda.policies.rivals.map_smoothing import smooth_map
 from hda.sensing.ranging import RangingLidar
 from hda.task.observation import Observation, ScenarioView
@@ -67,7 +73,7 @@ class SteeringOptions:
         for name in ("reserve", "likely"):
             finite_number(name, getattr(self, name), at_least=0.0, at_most=1.0)
         for name in ("targets", "samples"):
-            finite_number(name, getattr(self, name), at_least=2)
+            whole_number(name, getattr(self, name), at_least=2)
         finite_number("dispersion", self.dispersion, above=0.0)
 
 
@@ -95,7 +101,7 @@ class ReachabilitySteeringSite:
         low = observation.state.position[2] <= observation.target[2]
         if low or not belief.seen.any() or (not first and left <= options.commit_time):
             return observation.target, memory
-        safe = infer_unseen(belief.probability(), belief.seen)
+        safe = judge_ground(belief)
         if left - view.decision_interval <= options.commit_time or left <= options.selection_time:
             return self.landing_site(safe, observation, view, belief), memory
         targets = self._lattice(observation)
@@ -103,11 +109,11 @@ class ReachabilitySteeringSite:
         return observation.settled(targets[int(np.argmax(worth))]), memory
 
     def _lattice(self, observation: Observation) -> Array:
-        """[m] shape (k, 3): targets over the present look, the present one first, so that it wins ties."""
+        """[m] shape (k, 3): the present target, first so that it wins ties, and the lattice's others."""
         offset = np.linspace(-0.5, 0.5, self.options.targets) * observation.width
         north, east = (part.ravel() for part in np.meshgrid(offset, offset, indexing="ij"))
         across = np.stack([east, north, np.zeros(east.size)], axis=1)
-        return observation.target + np.vstack([np.zeros((1, 3)), across])
+        return observation.target + np.vstack([np.zeros((1, 3)), across[across.any(axis=1)]])
 
     def mean_safety(
         self,
@@ -121,7 +127,8 @@ class ReachabilitySteeringSite:
 
         Args:
             target: [m] shape (3,), steered to until then.
-            safe: shape (n, n), probability that each cell of the belief's square is safe.
+            safe: shape (n, n), probability that each cell of the belief's square is safe; ground beyond the
+                square is not counted.
             observation: the present look.
             view: the scenario.
             belief: whose square it is.
@@ -136,8 +143,10 @@ class ReachabilitySteeringSite:
         across = (y[:, None] - state.position[1]) ** 2 + (x - state.position[0]) ** 2
         counted = across <= (np.tan(lidar.off_nadir_limit) * height) ** 2
         counted &= self._within_reach(state, x, y, float(target[2]), view)
-        rows = np.clip(np.floor(y).astype(np.int64) - belief.corner[1], 0, belief.side - 1)
-        columns = np.clip(np.floor(x).astype(np.int64) - belief.corner[0], 0, belief.side - 1)
+        (rows, north), (columns, east) = (
+            _cells_of(place, belief.corner[axis], belief.side) for axis, place in ((1, y), (0, x))
+        )
+        counted &= north[:, None] & east
         return float(safe[np.ix_(rows, columns)][counted].mean()) if counted.any() else 0.0
 
     def _next_state(self, target: Array, observation: Observation, view: ScenarioView) -> State:
@@ -183,3 +192,9 @@ class ReachabilitySteeringSite:
         if distance[row, column] < 0.5:
             return target
         return observation.settled(np.array([x[column], y[row], plane]))
+
+
+def _cells_of(place: Array, corner: int, side: int) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Cells along an axis of the square at some places [m], and whether each lies within the square."""
+    cells = np.floor(place).astype(np.int64) - corner
+    return np.clip(cells, 0, side - 1), (cells >= 0) & (cells < side)

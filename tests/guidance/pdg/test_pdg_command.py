@@ -10,6 +10,7 @@ import pytest
 
 from guidance import Cone, Limits, solve_pdg, solve_pdg_6dof
 from guidance.pdg.__main__ import main
+from guidance.pdg.body_command import BodyOptions
 from guidance.rigid_body import DEFAULT_BODY
 
 STATE = ["--state", "200", "100", "950", "-8", "-4", "-30", "1200", "--target", "0", "0", "50"]
@@ -135,6 +136,17 @@ def test_what_only_a_point_mass_takes_is_refused_with_a_body(words, named, capsy
         main([*STATE, "--six-dof", *words])
     assert caught.value.code == 2
     assert named in capsys.readouterr().err
+
+
+def test_the_body_of_the_command_is_the_default_one():
+    assert BodyOptions().body_of(DEFAULT_BODY.lander, 1200.0) == DEFAULT_BODY
+
+
+def test_options_of_a_body_are_refused_without_one(capsys):
+    with pytest.raises(SystemExit) as caught:
+        main([*STATE, "--body.engine-lag", "0.3"])
+    assert caught.value.code == 2
+    assert "give --six-dof too" in capsys.readouterr().err
 
 
 def test_a_body_that_cannot_land_is_refused_with_its_proof(capsys):

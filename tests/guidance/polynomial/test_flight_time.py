@@ -59,6 +59,25 @@ def test_a_weak_engine_and_a_pointing_limit_are_kept():
         assert tilt.max() <= math.radians(20.0)
 
 
+def test_without_a_pointing_limit_the_cheapest_time_may_begin_with_thrust_downward():
+    """From rest straight above its site, a fall that an upside-down engine hastens costs the least.
+
+    With d m below and t s to go its thrust acceleration is linear, -6 d/t^2 + g first and 6 d/t^2 + g last.
+    """
+    rest = guidance.State(SITE + np.array([0.0, 0.0, 900.0]), np.zeros(3), 1200.0)
+
+    def cost(seconds: float) -> float:
+        first, last = (sign * 6.0 * 900.0 / seconds**2 - GRAVITY[2] for sign in (-1.0, 1.0))
+        share = np.linspace(0.0, 1.0, 2001)
+        return seconds * float(np.abs(first + share * (last - first)).mean())
+
+    free = cheapest_time_of_flight(rest, ARRIVALS[0], TIMES, LANDER, GRAVITY)
+    assert free == 45.25
+    assert cost(free) <= 1.002 * min(map(cost, TIMES))  # its integral has 16 steps
+    upright = replace(LANDER, pointing_limit=math.radians(45.0))
+    assert cheapest_time_of_flight(rest, ARRIVALS[0], TIMES, upright, GRAVITY) == 57.75
+
+
 def test_where_no_time_will_do_the_least_excess_is_taken():
     feeble = replace(LANDER, max_thrust=100.0)
     seconds = cheapest_time_of_flight(START, ARRIVALS[0], TIMES, feeble, GRAVITY)

@@ -156,6 +156,9 @@ def test_equal_seeds_give_equal_bytes_and_memory_is_never_changed():
     assert first.instant == 10
     with pytest.raises(ValueError, match="read-only"):
         first.estimate[0] = 0.0
+    for shared in (errors.accelerometer_bias, errors.beam_bias, errors.tilt, first.errors.accelerometer_bias):
+        with pytest.raises(ValueError, match="read-only"):
+            shared[0] = 0.0
 
 
 def test_a_path_in_two_parts_is_the_path_in_one():

@@ -106,9 +106,22 @@ def test_a_cell_that_two_looks_read_has_the_mean_variance_of_its_points():
     assert belief.placement.newest == 0.4
     assert belief.placement.variance[inner] == pytest.approx((1 * 2.0 + 3 * 0.4) / 4)
     assert belief.placement.variance[outer] == pytest.approx(2.0)
-    finer = belief.fused(level(1.25, 64, 32, 2), CRITERIA, 100.0, 0.1)
-    assert finer.placement is not None
-    assert finer.placement.variance[inner] == belief.placement.variance[inner]  # the finer cells are kept
+    coarser = belief.fused(level(1.25, 64, 32, 2), CRITERIA, 100.0, 0.1)
+    assert coarser.placement is not None
+    assert coarser.placement.variance[inner] == belief.placement.variance[inner]  # the finer cells are kept
+
+
+def test_a_newest_look_that_is_placed_worse_blurs_nothing():
+    belief = MeasuredBelief.blank(np.array([100.0, 100.0, 50.0]), 32)
+    belief = belief.fused(level(1.0, 80, 40, 1), CRITERIA, 100.0, 0.4)
+    worse = belief.fused(level(1.0, 90, 20, 1), CRITERIA, 100.0, 2.0)
+    told = infer_unseen(worse.probability(), worse.seen)
+    assert judge_ground(worse).tobytes() == told.tobytes()
+
+
+def test_a_greater_deviation_than_the_widest_is_taken_as_the_widest():
+    safe = random_map(4)
+    assert uniform(7.0, 40).blurred(safe).tobytes() == uniform(2.5, 40).blurred(safe).tobytes()
 
 
 def test_a_finer_look_brings_its_own_place():

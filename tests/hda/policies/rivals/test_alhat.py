@@ -121,5 +121,11 @@ def test_one_scan_from_within_range_decides():
 def test_weights_that_mean_nothing_are_refused(name):
     with pytest.raises(ValueError, match=name):
         AlhatWeights(**{name: -1.0})
+
+
+def test_a_share_and_a_clearance_that_mean_nothing_are_refused():
+    for share in (-0.1, 1.1):
+        with pytest.raises(ValueError, match="hazard_probability"):
+            AlhatWeights(hazard_probability=share)
     with pytest.raises(ValueError, match="clearance"):
         AlhatWeights(clearance=0.0)
