@@ -75,8 +75,8 @@ def test_how_many_first_flights_crash_for_the_deviation(
 def test_the_learner_in_one_file_learns(capsys: pytest.CaptureFixture[str]) -> None:
     """After 40 000 steps; a flight that never moves its target succeeds in 6 of 100 episodes.
 
-    Over seeds 0 to 4 the mean return rose by 1.32 (standard deviation 0.14), and 0.765 (0.041) landed: were the
-    random numbers of another library drawn, each bound would fail less than once in 100 000 times.
+    Over seeds 0 to 4 the mean return rose by 1.32 (standard deviation 0.14), and 0.765 (0.041) landed. The
+    bounds are four and five deviations below: with other random numbers each fails once in 30 000 times.
     """
     agent, rows = train(Settings(steps=40_960))
     gains = [gained for _, gained, _ in rows]
