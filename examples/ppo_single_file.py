@@ -26,7 +26,7 @@ class Settings:
     """What decides how it learns.
 
     Attributes:
-        steps: decisions flown in all.
+        steps: decisions flown in all, rounded down to whole updates; one update at least.
         environments: that fly together.
         horizon: decisions of each environment between two updates.
         epochs: passes over what was flown.
@@ -37,8 +37,8 @@ class Settings:
         clip: how far the ratio of likelihoods may leave 1.
         value_weight: of the critic's loss.
         greatest_gradient: norm at which gradients are cut.
-        log_deviation: of the actions at the start. Their range is [-1, 1]: with a deviation of 1 most first
-            flights crash, and the critic learns nothing but -10.
+        log_deviation: of the actions at the start. Their range is [-1, 1]: with a deviation of 1 about two in
+            three of the first flights crash, with this one about one in a hundred.
         seed: of the weights, the actions and the episodes.
     """
 
@@ -92,7 +92,7 @@ class Agent(nn.Module):
 
 @dataclass(frozen=True)
 class Rollout:
-    """What was flown between two updates; shapes (horizon, environments, ...), without horizon at the end."""
+    """Flown between two updates: shapes (horizon, environments, ...), `next_value` (environments,)."""
 
     seen: torch.Tensor
     action: torch.Tensor
@@ -175,8 +175,8 @@ def train(settings: Settings) -> tuple[Agent, list[tuple[int, float, float]]]:
     """Learn, and print on the way.
 
     Returns:
-        The agent; and after each update the steps, and the mean return and share of successes of the newest
-        500 episodes.
+        The agent; and for each update the steps flown by then, with the mean return and the share of
+        successes of the newest 500 episodes.
     """
     torch.manual_seed(settings.seed)
     torch.set_num_threads(1)

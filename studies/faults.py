@@ -1,4 +1,4 @@
-"""Each named fault of the navigation sensors, flown by every policy on the same episodes; why they failed.
+"""Each named fault of the navigation sensors, flown by policies on the same episodes; why they failed.
 
 The faults are those of `hda.navigation.NAVIGATION_FAULTS`; the filter knows of each. Beside the ratios stands
 the fall of success against the same episodes without a fault, with its paired 95 % interval, and what
@@ -7,7 +7,6 @@ the fall of success against the same episodes without a fault, with its paired 9
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -29,11 +28,17 @@ from studies.campaign.journal import Journal, open_journal
 from studies.campaign.monte_carlo import Study
 from studies.campaign.points import Point, Rows, fly_points
 from studies.campaign.provenance import describe_run, identify_run, write_provenance
-from studies.campaign.run_options import FolderOptions
-from studies.campaign.score import PROPELLANT_COLUMN, RATIO_COLUMNS, Score, scaled, score_rows
+from studies.campaign.run_options import FlyingOptions
+from studies.campaign.score import (
+    PROPELLANT_COLUMN,
+    RATIO_COLUMNS,
+    Score,
+    scaled,
+    score_rows,
+    success_drop,
+)
 from studies.columns import Column, Output, console_table, write_csv, write_markdown
-from studies.failures.causes import Failure, explain_failure
-from studies.statistics.paired import paired_ratio_interval
+from studies.failures.causes import Failure, count_causes, explain_failure
 from studies.statistics.ratios import Interval
 
 NO_FAULT = "no-fault"
@@ -42,37 +47,27 @@ _CAUSES = "causes"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Faults(FolderOptions):
+class Faults(FlyingOptions):
     """Command line.
 
     Attributes:
         faults: names of faults; `all` is every one.
-        policies: names of policies; `default` is every one that is not slow and not made for another
-            preset; `package.module:Name` is your own.
         episodes: episodes per policy and fault.
         preset: the setting, with a navigation filter.
         study_seed: seed of the study; equal seeds give equal episodes with every fault.
-        split: tile split: validation or fresh to evaluate, tuning for choices.
         explained: failures of each policy and fault that are flown again for their cause, the first ones.
-        workers: processes; changes nothing but the time.
     """
 
     faults: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME ...")] = ("all",)
-    policies: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME ...")] = ("default",)
     episodes: int = 200
     preset: str = "navigated"
-    study_seed: int = 0
-    split: str = "validation"
     explained: int = 12
-    workers: int = 2
     out: Path = Path("results/faults")
 
     def __post_init__(self) -> None:
         """Check every number."""
-        finite_number("episodes", self.episodes, at_least=1)
-        finite_number("study_seed", self.study_seed, at_least=0)
+        super().__post_init__()
         finite_number("explained", self.explained, at_least=0)
-        finite_number("workers", self.workers, at_least=1)
 
 
 @dataclass(frozen=True)
@@ -146,15 +141,19 @@ def plan_points(options: Faults) -> list[Point]:
 
 def explain_failures(point: Point, rows: Sequence[EpisodeRow], most: int, journal: Journal[Failure]) -> str:
     """Causes of a policy's first failures, each flown again unless the journal holds it, in words."""
-    study, causes = point.study, Counter[str]()
-    for row in [row for row in rows if not row.success][:most]:
+    study, pilot = point.study, point.study.make_policy(rows[0].policy)
 
-        def explain(row: EpisodeRow = row) -> Failure:
-            scenario = sample_scenario(study.preset, study.study_seed, row.episode, study.split)
-            return explain_failure(fly(study.make_policy(row.policy), scenario))
+    def explain(episode: int) -> Failure:
+        scenario = sample_scenario(study.preset, study.study_seed, episode, study.split)
+        return explain_failure(fly(pilot, scenario))
 
-        causes[journal.finish((point.label, row.policy, row.episode), explain).cause.value] += 1
-    return "; ".join(f"{count} x {cause}" for cause, count in causes.most_common())
+    failed = [row for row in rows if not row.success][:most]
+    return "; ".join(
+        count_causes(
+            journal.finish((point.label, row.policy, row.episode), lambda row=row: explain(row.episode))
+            for row in failed
+        )
+    )
 
 
 def tabulate(
@@ -165,7 +164,7 @@ def tabulate(
     pairs = [(point, policy) for point in points for policy in point.study.policies]
     for point, policy in track(pairs, "explaining failures", transient=True):
         rows = flown[point.label][policy]
-        drop = paired_ratio_interval([row.success for row in own[policy]], [row.success for row in rows])
+        drop = success_drop(own[policy], rows)
         causes = explain_failures(point, rows, most, journal)
         lines.append(FaultRow(point.label, policy, score_rows(rows), drop, causes))
     return lines

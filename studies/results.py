@@ -1,4 +1,4 @@
-"""The tables of docs/results made again, in the order of need: `make results`.
+"""The tables of docs/results, and one of docs/explanation, made again, in the order of need: `make results`.
 
 Each is a command of its own, which keeps finished work and goes on with it. What is finished at the present
 commit is written to a journal and not made again. Stopped, the same call goes on. Left out is what needs
@@ -37,7 +37,7 @@ class Result:
     """One table, or several that one command makes.
 
     Attributes:
-        page: under docs/results, which shows it.
+        page: which shows it, from docs/results.
         command: what makes it, behind `python -m`.
         resumable: the command has `--resume`.
     """
@@ -77,6 +77,7 @@ RESULTS: dict[str, Result] = {
         " nearest-safe nearest-safe+convex hazard-aware deferred-decision --out results/robustness_navigated",
     ),
     "faults": Result("robustness.md", "studies.faults"),
+    "rigid-plans": Result("../explanation/rigid-body.md", "studies.rigid_plans --starts 100"),
     "scale": Result("scale.md", "studies.scale --episodes 1000 10000"),
 }
 """Name -> what is made, the README's first."""

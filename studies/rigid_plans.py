@@ -24,7 +24,7 @@ from guidance import solve_pdg_6dof
 from guidance.console import tolerate_encoding
 from guidance.rigid_body import DEFAULT_BODY
 from guidance.rigid_descent import RigidPlan
-from guidance.successive.solve import DEFAULT_NODES, RigidPlanningMethod
+from guidance.successive.solve import DEFAULT_NODES, FEWEST_NODES, RigidPlanningMethod
 from guidance.validation import finite_number
 from hda.task.presets import find_preset
 from hda.task.scenario import sample_scenario
@@ -56,6 +56,8 @@ class RigidPlans(FolderOptions):
     def __post_init__(self) -> None:
         """Check every option."""
         finite_number("starts", self.starts, at_least=1)
+        finite_number("nodes", self.nodes, at_least=FEWEST_NODES)
+        find_preset(self.preset)
 
 
 @dataclass(frozen=True)
@@ -89,7 +91,17 @@ class PlannedStart:
 
 @dataclass(frozen=True)
 class MethodRow:
-    """One method over all starts; of flights alone, but for `count` and `seconds`."""
+    """One method over all starts.
+
+    Attributes:
+        method: who planned.
+        count: starts.
+        flights: starts with a flight; the numbers below but `seconds` are of these, nan without one.
+        seconds: [s] processor time of a plan: median, 99 % quantile, greatest.
+        gap: [kg] propellant above what no point mass undercuts: median, greatest.
+        miss: [m] flown, from the target, the greatest.
+        speed: [m/s] flown, at the end, the greatest.
+    """
 
     method: str
     count: int
@@ -164,7 +176,8 @@ def _row(start: int, method: str, seconds: float, plan: RigidPlan) -> PlannedSta
 def plan_all(options: RigidPlans, journal: Journal[PlannedStart]) -> list[PlannedStart]:
     """Plan every start by each method in turn; what the journal has is not planned again."""
     for method in METHODS:
-        plan_start(options.starts, method, options)  # compiled and assembled on first use: not counted
+        if any(journal.find((method, start)) is None for start in range(options.starts)):
+            plan_start(options.starts, method, options)  # compiled and assembled on first use: not counted
     out = []
     for start in track(range(options.starts), "plans", transient=True):
         for method in METHODS:
@@ -191,7 +204,7 @@ def sum_up(method: str, plans: Sequence[PlannedStart]) -> MethodRow:
 
 
 def conclude(plans: Sequence[PlannedStart]) -> list[str]:
-    """What is not optimal, and how far the methods are apart."""
+    """How planning ended, and how far the methods are apart where both have a flight."""
     words = []
     for (method, status), count in sorted(Counter((p.method, p.status) for p in plans).items()):
         words.append(f"{method}: {count} {status}.")
@@ -202,7 +215,7 @@ def conclude(plans: Sequence[PlannedStart]) -> list[str]:
     if both:
         words.append(
             f"On {len(both)} starts that both planned, {first} burns {min(both):+.3f} to {max(both):+.3f} kg "
-            f"beside {second}, {float(np.median(both)):+.3f} in the median."
+            f"more than {second}, {float(np.median(both)):+.3f} in the median."
         )
     return words
 
@@ -211,12 +224,11 @@ def study_rigid_plans(options: RigidPlans) -> list[MethodRow]:
     """Plan, and write tables, every plan, conclusions.txt and provenance.json.
 
     Raises:
-        ValueError: an option is out of range or names something unknown, or the folder holds another study.
+        ValueError: the folder holds another study, or `resume` and `overwrite` are both given.
         OSError: the folder cannot be written.
     """
     out, console = open_folder(options.out), Console(width=max(Console().width, 130))
     decided = {"preset": options.preset, "nodes": options.nodes}
-    find_preset(options.preset)
     identity = identify_run(Path(__file__), decided)
     with open_journal(out, PlannedStart, _PRODUCTS, identity, options.existing) as journal:
         plans = plan_all(options, journal)

@@ -3,12 +3,15 @@
 import runpy
 from pathlib import Path
 
+import gymnasium
 import numpy as np
 import pytest
 import torch
 
 import guidance
-from examples.ppo_single_file import Rollout, Settings, estimate_advantages, evaluate, train
+from examples.ppo_single_file import Agent, Rollout, Settings, estimate_advantages, evaluate, train
+from hda.flight.outcome import Ending
+from rl.environment.episode_info import ENDING_CODES
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
 
@@ -49,14 +52,37 @@ def test_advantages_of_the_learner_are_weighted_sums_of_surprises(trace: float) 
             assert float(given[k, row]) == pytest.approx(total, abs=1e-5)
 
 
+@pytest.mark.parametrize(("log_deviation", "bounds"), [(0.0, (0.5, 0.75)), (-1.5, (-0.1, 0.05))])
+def test_how_many_first_flights_crash_for_the_deviation(
+    log_deviation: float, bounds: tuple[float, float]
+) -> None:
+    """Of 640 flights 63 and 0.8 % crashed; each bound is 5 standard deviations of 500 flights off."""
+    torch.manual_seed(0)
+    agent, envs = Agent(44, 5, log_deviation), gymnasium.make_vec("rl:LunarHDA-v0", num_envs=50)
+    seen, crashed = envs.reset(seed=0)[0], []
+    while len(crashed) < 500:
+        with torch.no_grad():
+            action = agent.distribution(torch.from_numpy(seen)).sample().numpy()
+        seen, _, terminated, truncated, info = envs.step(action)
+        ended = terminated | truncated
+        if ended.any():
+            crashed += (info["final_info"]["ending"][ended] == ENDING_CODES[Ending.CRASH]).tolist()
+    envs.close()
+    assert bounds[0] < np.mean(crashed) < bounds[1]
+
+
 @pytest.mark.slow
 def test_the_learner_in_one_file_learns(capsys: pytest.CaptureFixture[str]) -> None:
-    """After 40 000 steps; a flight that never moves its target succeeds in 6 of 100 episodes."""
+    """After 40 000 steps; a flight that never moves its target succeeds in 6 of 100 episodes.
+
+    Over seeds 0 to 4 the mean return rose by 1.32 (standard deviation 0.14), and 0.765 (0.041) landed. The
+    bounds are four and five deviations below: with other random numbers each fails once in 30 000 times.
+    """
     agent, rows = train(Settings(steps=40_960))
     gains = [gained for _, gained, _ in rows]
     assert rows[-1][0] == 40_960
-    assert gains[-1] > gains[0] + 0.4
+    assert gains[-1] > gains[0] + 0.7
     gained, landed = evaluate(agent, 200)
-    assert landed > 0.4
+    assert landed > 0.55
     assert gained > np.mean(gains[:3])
     assert "steps/s" in capsys.readouterr().out

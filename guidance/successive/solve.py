@@ -28,7 +28,8 @@ RigidPlanningMethod = Literal["successive", "casadi"]
 """Who plans: successive convexification, or the independent reference."""
 DEFAULT_NODES = 31
 """Nodes of a plan unless asked otherwise."""
-_FEWEST_NODES = 5
+FEWEST_NODES = 5
+"""Least number of nodes that a plan may be asked for."""
 
 
 def solve_pdg_6dof(
@@ -75,7 +76,7 @@ def solve_pdg_6dof(
             the nodes; nothing is proved. `error.plan` is of the type of every planner's: a Plan of the point
             mass without a flight, with this status and message. `throw=False` gives the RigidPlan itself.
     """
-    nodes = whole_number("nodes", nodes, _FEWEST_NODES)
+    nodes = whole_number("nodes", nodes, FEWEST_NODES)
     problem = RigidLandingProblem(
         RigidState.parse(state),
         finite_vector("target", target, 3),

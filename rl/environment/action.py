@@ -85,7 +85,9 @@ def scale_actions(
     if values.shape != expected:
         raise ValueError(f"action must have shape {expected}, got {values.shape}")
     if not np.isfinite(values).all():
-        raise ValueError(f"action must be finite, got {values.tolist()}")
+        first = tuple(np.argwhere(~np.isfinite(values).all(axis=-1))[0].tolist())
+        where = f" in row {', '.join(map(str, first))}" if first else ""
+        raise ValueError(f"action must be finite, got {values[first].tolist()}{where}")
     position_gain, velocity_gain, step, shift_x, shift_y = np.moveaxis(np.clip(values, -1.0, 1.0), -1, 0)
     greatest = ranges.shift * widths
     return ScaledActions(

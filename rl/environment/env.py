@@ -141,28 +141,28 @@ class LandingEnv(gymnasium.Env[ObsType, Array32], Generic[ObsType]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[ObsType, dict[str, Any]]:
-        """Begin an episode.
+        """Begin an episode; where that fails, study and flight stay as they were.
 
         Raises:
             ValueError: an unknown option.
         """
-        super().reset(seed=seed)
         chosen = dict(options or {})
         refuse_unknown_options(chosen, ("scenario", *DISPERSION_NAMES))
-        if seed is not None or self.study_seed is None:
-            self.study_seed = int(self.np_random.integers(2**31)) if seed is None else seed
-            self.next_episode = 0
+        study, episode = (self.study_seed, self.next_episode) if seed is None else (seed, 0)
+        if study is None:
+            study, episode = int(self.np_random.integers(2**31)), 0
         scenario = chosen.pop("scenario", None)
         if scenario is None:
             self.source.prepare()
-            scenario = self.source.scenario(self.study_seed, self.next_episode, chosen)
-            self.next_episode += 1
+            scenario = self.source.scenario(study, episode, chosen)
+            episode += 1
         elif not isinstance(scenario, Scenario):
             raise ValueError(f"options['scenario'] must be an hda.Scenario, got {type(scenario).__name__}")
         elif chosen:
             raise ValueError(f"a given scenario keeps its dispersions; got also {', '.join(sorted(chosen))}")
-        self.scenario = scenario
-        self.steps = []
+        super().reset(seed=seed)
+        self.study_seed, self.next_episode = study, episode
+        self.scenario, self.steps = scenario, []
         return self._look(begin_flight(scenario))
 
     def step(self, action: Array32) -> tuple[ObsType, float, bool, bool, dict[str, Any]]:

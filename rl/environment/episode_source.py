@@ -27,6 +27,7 @@ class EpisodeSource:
     preset: str | Preset = "paper"
     split: str = "train"
     dispersions: Dispersions = field(default_factory=Dispersions)
+    _prepared: bool = field(default=False, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         """Refuse what no episode could be drawn from."""
@@ -37,15 +38,12 @@ class EpisodeSource:
     def _setting(self) -> Preset:
         return self.dispersions.applied(find_preset(self.preset))
 
-    @cached_property
-    def _ready(self) -> bool:
-        setting = find_preset(self.preset)
-        prepare_tiles(Ground(setting.terrain, setting.criteria), self.split)
-        return True
-
     def prepare(self) -> None:
         """Build the tiles of the split that are missing, with a progress bar; once for each source."""
-        assert self._ready
+        if not self._prepared:
+            setting = find_preset(self.preset)
+            prepare_tiles(Ground(setting.terrain, setting.criteria), self.split)
+            object.__setattr__(self, "_prepared", True)
 
     def scenario(self, study_seed: int, episode: int, changes: dict[str, float]) -> Scenario:
         """Draw one; `changes` replace single dispersions."""

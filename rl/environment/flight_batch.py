@@ -35,6 +35,12 @@ REWARD_TERMS = tuple(term.name for term in fields(RewardTerms))
 """The terms of the reward, in the order of the arrays here."""
 
 
+def check_count(name: str, value: object) -> None:
+    """Raise ValueError naming `name` where `value` is no whole number of at least one."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1:
+        raise ValueError(f"{name} must be a whole number of at least 1, got {value!r}")
+
+
 @dataclass(frozen=True)
 class BatchSettings:
     """What the episodes of a batch share.
@@ -56,9 +62,8 @@ class BatchSettings:
 
     def __post_init__(self) -> None:
         """Refuse what the kernels cannot fly."""
-        for name, value in (("num_envs", self.count), ("threads", self.threads)):
-            if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1:
-                raise ValueError(f"{name} must be a whole number of at least 1, got {value!r}")
+        check_count("num_envs", self.count)
+        check_count("threads", self.threads)
         preset = self.preset
         if not isinstance(preset.lidar, Lidar) or preset.stance is not None or preset.navigation is not None:
             raise ValueError(

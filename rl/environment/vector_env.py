@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from guidance.arrays import Index
 from hda.task.presets import find_preset
+from hda.task.scenario import Scenario
 from rl.environment.encoding import clip_latent, encode_flights, map_into
 from rl.environment.env import (
     DISPERSION_NAMES,
@@ -21,7 +22,7 @@ from rl.environment.env import (
     LunarHDAMapEnv,
     refuse_unknown_options,
 )
-from rl.environment.flight_batch import BatchSettings, FlightBatch
+from rl.environment.flight_batch import BatchSettings, FlightBatch, check_count
 from rl.environment.vector_info import Mask, blank_others, describe_batch, with_masks
 from rl.inference.arrays import Array32
 from rl.inference.latent import LATENT_SIZE
@@ -84,8 +85,8 @@ class LandingVectorEnv(VectorEnv[Seen, Array32, Any], Generic[Seen]):
         self.single = self.make_single(**options)
         setting = find_preset(self.single.source.preset)
         self.batch = FlightBatch(BatchSettings(setting, num_envs, self.single.action_ranges, threads))
-        if max_episode_steps is not None and max_episode_steps < 1:
-            raise ValueError(f"max_episode_steps must be at least 1, got {max_episode_steps}")
+        if max_episode_steps is not None:
+            check_count("max_episode_steps", max_episode_steps)
         self.num_envs, self.max_episode_steps = int(num_envs), max_episode_steps
         self.single_observation_space = self.single.observation_space
         self.single_action_space = self.single.action_space
@@ -116,19 +117,28 @@ class LandingVectorEnv(VectorEnv[Seen, Array32, Any], Generic[Seen]):
     ) -> tuple[Seen, dict[str, Any]]:
         """Begin an episode in every environment, or in those of `options["reset_mask"]`.
 
+        Where it fails, everything stays as it was: the study, its next episodes, and the flights.
+
         Raises:
             ValueError: an unknown option, a wrong mask, or a mask that leaves some out where a study begins.
         """
         changes = dict(options or {})
         refuse_unknown_options(changes, ("reset_mask", *DISPERSION_NAMES))
         mask = _check_mask(changes.pop("reset_mask", None), self.num_envs)
-        if seed is not None or self.study_seed is None:
-            if not mask.all():
-                raise ValueError("options must leave out reset_mask where a study begins, got some of them")
-            super().reset(seed=seed)
-            self.study_seed = int(self.np_random.integers(2**31)) if seed is None else seed
-            self.next_episode = np.arange(self.num_envs)
-        self._begin(mask, changes)
+        anew = seed is not None or self.study_seed is None
+        if (anew or not self._seen) and not mask.all():
+            raise ValueError(
+                "options['reset_mask'] must name every environment where a study begins, got"
+                f" {np.flatnonzero(mask).tolist()} of {self.num_envs}"
+            )
+        study = self.study_seed if seed is None else seed
+        if study is None:
+            study = int(self.np_random.integers(2**31))
+        episodes = np.arange(self.num_envs) if anew else self.next_episode
+        scenarios = self._draw(study, episodes, mask, changes)
+        super().reset(seed=seed)
+        self.study_seed, self.next_episode = study, episodes
+        self._begin(mask, scenarios)
         return self._observation(), with_masks(describe_batch(self.batch), mask)
 
     def step(self, actions: Array32) -> tuple[Seen, Any, Mask, Mask, dict[str, Any]]:
@@ -138,9 +148,13 @@ class LandingVectorEnv(VectorEnv[Seen, Array32, Any], Generic[Seen]):
             ValueError: the actions are not five finite numbers for each environment.
             gymnasium.error.ResetNeeded: an episode is over or has not begun.
         """
-        if not self._seen or self._ended.any():
-            waiting = np.flatnonzero(self._ended).tolist() or "any"
-            raise gymnasium.error.ResetNeeded(f"no episode is under way in {waiting}: call reset()")
+        if not self._seen:
+            raise gymnasium.error.ResetNeeded("no episode has begun: call reset()")
+        if self._ended.any():
+            waiting = np.flatnonzero(self._ended).tolist()
+            raise gymnasium.error.ResetNeeded(
+                f"no episode is under way in environments {waiting}: call reset()"
+            )
         batch, everyone = self.batch, np.ones(self.num_envs, np.bool_)
         rewards = batch.advance(actions)
         terminated, truncated = batch.landed.copy(), batch.timed_out.copy()
@@ -155,7 +169,8 @@ class LandingVectorEnv(VectorEnv[Seen, Array32, Any], Generic[Seen]):
             final = with_masks(describe_batch(batch), ended)
             info = {"final_obs": self.present(last), "_final_obs": ended}
             info |= {"final_info": final, "_final_info": ended.copy()}
-            self._begin(ended, {})
+            assert self.study_seed is not None
+            self._begin(ended, self._draw(self.study_seed, self.next_episode, ended, {}))
         info |= with_masks(describe_batch(batch), everyone)
         return self._observation(), rewards, terminated, truncated, info
 
@@ -166,15 +181,17 @@ class LandingVectorEnv(VectorEnv[Seen, Array32, Any], Generic[Seen]):
         """Let the threads go."""
         self.batch.close()
 
-    def _begin(self, mask: Mask, changes: dict[str, float]) -> None:
-        """Begin the next episode of each environment of a mask, with changed dispersions."""
-        assert self.study_seed is not None
+    def _draw(self, study: int, episodes: Index, mask: Mask, changes: dict[str, float]) -> list[Scenario]:
+        """The next episode of each environment of a mask, with changed dispersions."""
         source = self.single.source
         source.prepare()
-        for place in np.flatnonzero(mask).tolist():
-            scenario = source.scenario(self.study_seed, int(self.next_episode[place]), changes)
+        return [source.scenario(study, episode, changes) for episode in episodes[mask].tolist()]
+
+    def _begin(self, mask: Mask, scenarios: list[Scenario]) -> None:
+        """Begin an episode in each environment of a mask."""
+        for place, scenario in zip(np.flatnonzero(mask).tolist(), scenarios, strict=True):
             self.batch.begin(place, scenario)
-            self.next_episode[place] += self.num_envs
+        self.next_episode[mask] += self.num_envs
         self._ended &= ~mask
         self._look(mask)
 

@@ -23,6 +23,7 @@ def describe_batch(batch: FlightBatch) -> dict[str, Any]:
     All episodes must have begun.
     """
     scenarios = [scenario for scenario in batch.scenarios if scenario is not None]
+    assert len(scenarios) == batch.settings.count
     outcomes, dry_mass = batch.outcomes, batch.settings.preset.lander.dry_mass
     terms = zip(REWARD_TERMS, batch.reward_terms.T.copy(), strict=True)
     return {

@@ -23,7 +23,7 @@ class StableBaselinesVector(VecEnv):
     the newest beginnings. `VecMonitor` around it gives the learners returns and lengths.
     """
 
-    def __init__(self, vector: LandingVectorEnv[Any] | gymnasium.vector.VectorEnv[Any, Any, Any]) -> None:
+    def __init__(self, vector: gymnasium.vector.VectorEnv[Any, Any, Any]) -> None:
         """Take a vector, as `gymnasium.make_vec` makes it.
 
         Raises:
@@ -41,10 +41,28 @@ class StableBaselinesVector(VecEnv):
     def reset(self) -> VecEnvObs:
         """Begin an episode in every environment: of the study that `seed` named, or the next ones."""
         seen, info = self.vector.reset(seed=self._seeds[0], options=self._options[0] or None)
-        self.reset_infos = rows_of(info, self.num_envs)
+        self.reset_infos = rows_of(info)
         self._reset_seeds()
         self._reset_options()
         return seen
+
+    def set_options(self, options: list[dict[str, Any]] | dict[str, Any] | None = None) -> None:
+        """Let the next `reset()` have these options, alike in every environment.
+
+        Raises:
+            ValueError: a list has other than one entry for each environment, its entries differ, or
+                `reset_mask` is among them: a reset here begins all.
+        """
+        each = options if isinstance(options, list) else [options or {}] * self.num_envs
+        if len(each) != self.num_envs:
+            raise ValueError(
+                f"options must have {self.num_envs} entries, one an environment, got {len(each)}"
+            )
+        if any("reset_mask" in entry for entry in each):
+            raise ValueError("options must leave out reset_mask here: reset() begins every environment")
+        if any(entry != each[0] for entry in each):
+            raise ValueError(f"options must be alike for all environments of a native vector, got {each}")
+        super().set_options(options)
 
     def step_async(self, actions: np.ndarray) -> None:
         """Keep the actions, shape (n, 5)."""
@@ -57,8 +75,8 @@ class StableBaselinesVector(VecEnv):
         last = info.pop("final_obs", None)
         for key in ("_final_obs", "_final_info"):
             info.pop(key, None)
-        infos = rows_of(info, self.num_envs)
-        ended = rows_of(final, self.num_envs) if done.any() else []
+        infos = rows_of(info)
+        ended = rows_of(final) if done.any() else []
         for k in np.flatnonzero(done).tolist():
             self.reset_infos[k] = infos[k]
             infos[k] = {**ended[k], "terminal_observation": _row(last, k)}
@@ -95,12 +113,10 @@ class StableBaselinesVector(VecEnv):
         return [False for _ in self._get_indices(indices)]
 
 
-def rows_of(info: dict[str, Any], count: int) -> list[dict[str, Any]]:
+def rows_of(info: dict[str, Any]) -> list[dict[str, Any]]:
     """The `info` of each environment, of a vector's: plain numbers, and dictionaries of such."""
     keys = [key for key in info if not key.startswith("_")]
-    columns = [
-        rows_of(info[key], count) if isinstance(info[key], dict) else info[key].tolist() for key in keys
-    ]
+    columns = [rows_of(info[key]) if isinstance(info[key], dict) else info[key].tolist() for key in keys]
     return [dict(zip(keys, values, strict=True)) for values in zip(*columns, strict=True)]
 
 

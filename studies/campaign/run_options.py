@@ -50,7 +50,7 @@ class FolderOptions(KeepingOptions):
 
 
 @dataclass(frozen=True, kw_only=True)
-class RunOptions(FolderOptions):
+class FlyingOptions(FolderOptions):
     """Options of a run that flies policies; a command adds its own, and describes those that differ there.
 
     Attributes:
@@ -61,7 +61,6 @@ class RunOptions(FolderOptions):
         study_seed: seed of the study; equal seeds give equal episodes.
         split: tile split: validation or fresh.
         workers: processes; changes nothing but the time.
-        figures: draw the figure.
     """
 
     policies: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME ...")] = ("default",)
@@ -69,10 +68,20 @@ class RunOptions(FolderOptions):
     study_seed: int = 0
     split: str = "validation"
     workers: int = 2
-    figures: bool = True
 
     def __post_init__(self) -> None:
         """Check every number."""
         finite_number("episodes", self.episodes, at_least=1)
         finite_number("workers", self.workers, at_least=1)
         finite_number("study_seed", self.study_seed, at_least=0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunOptions(FlyingOptions):
+    """Options of a run that flies policies and draws a figure.
+
+    Attributes:
+        figures: draw the figure.
+    """
+
+    figures: bool = True

@@ -6,7 +6,7 @@ moments (`studies.statistics.moments`). Rows must come in the order of their epi
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from hda.flight.episode_row import MEASURES, RATIOS, EpisodeRow
 from studies.columns import Column, Output
 from studies.statistics.moments import TileMoments, mean_intervals
+from studies.statistics.paired import paired_ratio_interval
 from studies.statistics.ratios import Interval, clustered_count_interval, wilson_interval
 from studies.statistics.reliability import exact_lower_bound
 
@@ -135,6 +136,15 @@ def score_rows(rows: Iterable[EpisodeRow]) -> Score:
     for row in rows:
         running.add(row)
     return running.collect()
+
+
+def success_drop(reference: Sequence[EpisodeRow], rows: Sequence[EpisodeRow]) -> Interval:
+    """Fall of the ratio of successes against the same episodes in another setting: paired, 95 % interval.
+
+    Raises:
+        ValueError: there is no row, or not as many of both.
+    """
+    return paired_ratio_interval([row.success for row in reference], [row.success for row in rows])
 
 
 def scaled(interval: Interval, factor: float) -> Interval:

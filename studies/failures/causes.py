@@ -17,6 +17,8 @@ anew, so that such a success may be luck. So it is where no safe ground had been
 from __future__ import annotations
 
 import math
+from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
@@ -239,6 +241,12 @@ def _find_hard_cause(record: EpisodeRecord) -> Cause:
     if looks > 2 and last_change(record) >= looks - 2:
         return Cause.LATE_DIVERT
     return Cause.HARD
+
+
+def count_causes(failures: Iterable[Failure]) -> list[str]:
+    """How many failed of each cause, in words, the most frequent first."""
+    counts = Counter(failure.cause.value for failure in failures)
+    return [f"{count} x {cause}" for cause, count in counts.most_common()]
 
 
 def find_remedies(study: Study, policy: str, record: EpisodeRecord) -> tuple[str, ...]:

@@ -8,7 +8,6 @@ from flying the same episode with a noiseless map or an exact engine (`studies.f
 from __future__ import annotations
 
 import json
-from collections import Counter
 from dataclasses import asdict, dataclass, replace
 from io import BytesIO
 from pathlib import Path
@@ -30,7 +29,7 @@ from studies.campaign.provenance import describe_run, identify_run, restore_stud
 from studies.campaign.run_options import KeepingOptions
 from studies.campaign.shards import read_shard, write_durably
 from studies.columns import write_csv
-from studies.failures.causes import Failure, explain_failure, find_remedies
+from studies.failures.causes import Failure, count_causes, explain_failure, find_remedies
 from studies.failures.table import COLUMNS, describe_failure, picture_name, write_markdown
 
 _PRODUCTS = (
@@ -188,7 +187,6 @@ def main() -> None:
         explained = show_failures(options)
         console = Console()
         for policy, failures in explained.items():
-            counts = Counter(failure.cause.value for failure in failures)
-            words = "; ".join(f"{count} x {cause}" for cause, count in counts.most_common()) or "none"
+            words = "; ".join(count_causes(failures)) or "none"
             console.print(f"{policy}: {words}", highlight=False, markup=False)
         console.print(f"pictures and causes in {options.out or options.study / 'failures'}", markup=False)

@@ -8,7 +8,7 @@ from pathlib import Path
 from hda.flight.outcome import ENDINGS
 from studies.campaign.monte_carlo import Study
 from studies.columns import Column, field_columns
-from studies.failures.causes import Cause, Failure
+from studies.failures.causes import Cause, Failure, count_causes
 
 
 def describe_failure(failure: Failure) -> str:
@@ -55,8 +55,7 @@ def write_markdown(
     for policy, failures in explained.items():
         shown = f"the first {len(failures)}" if len(failures) < failed[policy] else "all"
         lines += ["", f"## {policy}: {failed[policy]} failed, {shown} shown", ""]
-        counts = Counter(failure.cause.value for failure in failures)
-        lines += [f"- {count} x {cause}" for cause, count in counts.most_common()]
+        lines += [f"- {counted}" for counted in count_causes(failures)]
         faults = Counter(fault for failure in failures for fault in failure.faults)
         if faults:
             told = ", ".join(f"{count} x {fault}" for fault, count in faults.most_common())

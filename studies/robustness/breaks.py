@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from hda.flight.episode_row import EpisodeRow
 from studies.campaign.points import Rows
-from studies.statistics.paired import paired_ratio_interval
+from studies.campaign.score import success_drop
 from studies.statistics.ratios import Interval
 
 
@@ -46,11 +46,6 @@ class Break:
     more: int
     episodes: tuple[int, ...]
     causes: str = ""
-
-
-def success_drop(nominal: Sequence[EpisodeRow], level: Sequence[EpisodeRow]) -> Interval:
-    """Fall of the ratio of successes, with its paired 95 % interval."""
-    return paired_ratio_interval([row.success for row in nominal], [row.success for row in level])
 
 
 def find_breaks(factor: str, own: float, nominal: Rows, levels: Mapping[float, Rows]) -> list[Break]:

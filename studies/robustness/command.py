@@ -8,7 +8,6 @@ that became more frequent, and the causes that `studies.failures` computes for t
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -32,7 +31,7 @@ from studies.campaign.points import Point, fly_points
 from studies.campaign.provenance import describe_run, write_provenance
 from studies.campaign.run_options import RunOptions
 from studies.columns import write_csv, write_markdown
-from studies.failures.causes import explain_failure
+from studies.failures.causes import count_causes, explain_failure
 from studies.robustness.breaks import Break, find_breaks
 from studies.robustness.factor import Factor
 from studies.robustness.factors import choose_factors
@@ -146,12 +145,12 @@ def run_robustness(options: Robustness) -> list[Sweep]:
 
 def explain_break(found: Break, study: Study) -> str:
     """Causes of the failures that a break brought, each flown again, the most frequent first."""
-    causes = Counter()
     pilot = study.make_policy(found.policy)
-    for episode in found.episodes[:_EXPLAINED]:
-        record = fly(pilot, sample_scenario(study.preset, study.study_seed, episode, study.split))
-        causes[explain_failure(record).cause.value] += 1
-    return "; ".join(f"{count} x {cause}" for cause, count in causes.most_common())
+    scenarios = (
+        sample_scenario(study.preset, study.study_seed, episode, study.split)
+        for episode in found.episodes[:_EXPLAINED]
+    )
+    return "; ".join(count_causes(explain_failure(fly(pilot, scenario)) for scenario in scenarios))
 
 
 def write_sweeps(out: Path, sweeps: Sequence[Sweep], options: Robustness) -> None:
@@ -178,11 +177,12 @@ def print_sweeps(sweeps: Sequence[Sweep]) -> None:
             continue
         first = sweep.breaks[0]
         same = [b.policy for b in sweep.breaks[1:] if (b.step, b.side) == (first.step, first.side)]
+        causes = f" ({first.causes})" if first.causes else ""
         tail = f"; also {', '.join(same)}" if same else ""
         console.print(
             f"{sweep.factor.name}: {first.policy} breaks first, at {first.level:g} ({sweep.factor.label}):"
             f" success falls by {100.0 * first.drop.estimate:.1f} points, mostly {first.ending}"
-            f" ({first.causes}){tail}",
+            f"{causes}{tail}",
             highlight=False,
             markup=False,
         )

@@ -9,9 +9,16 @@ from pathlib import Path
 
 from hda.registry import policy_entry
 from studies.campaign.points import Rows
-from studies.campaign.score import PROPELLANT_COLUMN, RATIO_COLUMNS, Score, scaled, score_rows
+from studies.campaign.score import (
+    PROPELLANT_COLUMN,
+    RATIO_COLUMNS,
+    Score,
+    scaled,
+    score_rows,
+    success_drop,
+)
 from studies.columns import Column, Output
-from studies.robustness.breaks import Break, success_drop
+from studies.robustness.breaks import Break
 from studies.robustness.factor import Factor
 from studies.statistics.ratios import Interval, wilson_interval
 

@@ -9,6 +9,7 @@ import pytest
 from hda.navigation import NAVIGATION_FAULTS, add_fault
 from hda.task.presets import PRESETS
 from studies import faults
+from studies.campaign import monte_carlo
 from studies.campaign.claimed_folder import FolderError
 from studies.faults import NO_FAULT, Faults, fault_presets, plan_points, run_faults
 
@@ -65,14 +66,19 @@ def test_a_run_tells_why_and_goes_on_without_flying_again(
     assert float(told[0]["success_drop_points"]) == 0.0
     for line, row in zip(lines, told, strict=True):
         failed = 3 - round(3 * line.score.success.estimate)
+        assert failed > 0
         assert sum(int(part.split(" x ")[0]) for part in row["causes"].split("; ")) == min(failed, 2)
     before = (tmp_path / "table.csv").read_bytes()
 
     def refuse(*arguments: object) -> None:
         raise AssertionError("it was flown again")
 
-    monkeypatch.setattr(faults, "fly", refuse)
+    for module in (faults, monte_carlo):  # explains; flies the points
+        monkeypatch.setattr(module, "fly", refuse)
     with pytest.raises(FolderError, match="holds a study already"):
         run_faults(options)
     run_faults(replace(options, resume=True))
     assert (tmp_path / "table.csv").read_bytes() == before
+    next((tmp_path / NO_FAULT / "shards").glob("episodes-*.jsonl")).unlink()
+    with pytest.raises(ValueError, match="it was flown again"):  # what is missing is flown, in this process
+        run_faults(replace(options, resume=True))

@@ -11,7 +11,9 @@ from gymnasium.envs.registration import EnvSpec
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 import rl  # noqa: F401 - registers the environments
+from rl.environment.env import LunarHDAMapEnv
 from rl.environment.vector_env import LandingVectorEnv, LunarHDAMapVectorEnv, LunarHDAVectorEnv
+from rl.inference.artefacts import WEIGHTS_FOLDER, read_card
 from tests.equality import same
 
 IDS = ("LunarHDA-v0", "LunarHDA-Map-v0")
@@ -146,7 +148,7 @@ def test_disabled_begins_what_the_mask_names_and_nothing_else(kind):
 
 
 def test_stepping_before_the_first_reset_asks_for_one():
-    with pytest.raises(gymnasium.error.ResetNeeded):
+    with pytest.raises(gymnasium.error.ResetNeeded, match="no episode has begun"):
         LunarHDAMapVectorEnv(2).step(still(2))
 
 
@@ -175,7 +177,8 @@ def test_what_is_seen_shares_no_memory_with_what_is_kept(kind):
         ({"preset": "papr"}, "preset"),
         ({"num_envs": 0}, "num_envs"),
         ({"threads": 0}, "threads"),
-        ({"max_episode_steps": 0}, "max_episode_steps"),
+        ({"max_episode_steps": 0}, "max_episode_steps must be a whole number"),
+        ({"max_episode_steps": 2.5}, "max_episode_steps must be a whole number"),
         ({"autoreset_mode": "NextStep"}, "autoreset_mode must be"),
         ({"autoreset_mode": "same_step"}, "autoreset_mode must be"),
         ({"render_mode": "rgb_array"}, "render_mode"),
@@ -207,11 +210,55 @@ def test_bad_masks_are_named(mask, message):
 def test_a_study_begins_everywhere_and_unknown_options_are_named():
     vector, part = LunarHDAMapVectorEnv(2), {"reset_mask": np.array([True, False])}
     for seed in (None, 0):
-        with pytest.raises(ValueError, match="reset_mask"):
+        with pytest.raises(ValueError, match=r"reset_mask'\] must name every .*, got \[0\] of 2"):
             vector.reset(seed=seed, options=part)
     with pytest.raises(ValueError, match="thrust_eror"):
         vector.reset(options={"thrust_eror": 0.0})
     vector.reset(seed=0)
-    for bad in (still(3), np.full((2, 5), np.nan)):
-        with pytest.raises(ValueError, match="action"):
+    broken = still(2)
+    broken[1, 3] = np.nan
+    for bad, words in ((still(3), "shape"), (broken, r"got \[0.0, 0.0, 0.0, nan, 0.0\] in row 1")):
+        with pytest.raises(ValueError, match=f"action must .*{words}"):
             vector.step(bad)
+
+
+BAD_RESETS = [{"altitude": -1.0}, {"thrust_eror": 0.0}]
+
+
+@pytest.mark.parametrize("kind", [LunarHDAMapVectorEnv, lambda count: LunarHDAMapEnv()])
+@pytest.mark.parametrize("bad", BAD_RESETS)
+@pytest.mark.parametrize("seed", [None, 4])
+def test_a_reset_that_fails_changes_nothing(kind, bad, seed):
+    """Before the first study and in the midst of one; the next reset and step are as if it had not been."""
+    failed, other = kind(2), kind(2)
+    with pytest.raises(ValueError, match=next(iter(bad))):
+        failed.reset(seed=seed, options=bad)
+    assert failed.study_seed is None
+    with pytest.raises(gymnasium.error.ResetNeeded):
+        failed.step(still(2))
+    assert same(failed.reset(seed=9), other.reset(seed=9))
+    with pytest.raises(ValueError, match=next(iter(bad))):
+        failed.reset(seed=seed, options=bad)
+    action = still(2) if isinstance(failed, LandingVectorEnv) else still(1)[0]
+    assert same(failed.step(action), other.step(action))
+    assert same(failed.reset(), other.reset())
+
+
+def test_a_mask_after_a_failed_first_reset_is_refused():
+    vector, part = LunarHDAMapVectorEnv(2), {"reset_mask": np.array([True, False])}
+    with pytest.raises(ValueError, match="altitude"):
+        vector.reset(seed=0, options={"altitude": -1.0})
+    with pytest.raises(ValueError, match="reset_mask"):
+        vector.reset(options=part)
+    vector.reset()
+    vector.reset(options=part)
+
+
+def test_the_threshold_is_what_every_run_of_the_recipe_earned():
+    """Of three trainings, on 1000 validation episodes each: `rl/weights/td3.json`."""
+    runs = read_card(WEIGHTS_FOLDER / "td3.json", "actor")["training"]["seeds"]
+    earned = [run["validation"]["reward"] for run in runs]
+    assert len(earned) == 3
+    for name in IDS:
+        threshold = gymnasium.spec(name).reward_threshold
+        assert threshold == np.floor(100.0 * min(earned)) / 100.0

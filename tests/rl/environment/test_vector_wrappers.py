@@ -10,13 +10,13 @@ import pytest
 import torch
 from gymnasium import wrappers
 from gymnasium.wrappers import vector as vector_wrappers
-from torch import nn
-from torch.distributions import Normal
 
 import rl  # noqa: F401 - registers the environments
+from examples.ppo_single_file import Agent
 from rl.environment.env import LunarHDAMapEnv
 
 IDS = ("LunarHDA-v0", "LunarHDA-Map-v0")
+VERSION = tuple(int(part) for part in gymnasium.__version__.split(".")[:2])
 
 
 def returns_and_lengths(name: str, episodes: int, seed: int) -> list[tuple[float, int]]:
@@ -44,7 +44,7 @@ def test_statistics_of_episodes_are_those_of_single_environments(name):
 
 
 # before 1.3 the wrapper reads the dictionary in `final_obs` as one of infos
-@pytest.mark.parametrize("name", IDS if gymnasium.__version__ >= "1.3" else IDS[:1])
+@pytest.mark.parametrize("name", IDS if VERSION >= (1, 3) else IDS[:1])
 def test_infos_become_lists(name):
     envs = vector_wrappers.DictInfoToList(gymnasium.make_vec(name, num_envs=4))
     _, infos = envs.reset(seed=1)
@@ -101,46 +101,33 @@ def test_pictures_are_collected_step_by_step():
     assert not np.array_equal(*frames)
 
 
-class Agent(nn.Module):
-    """Actor and critic as in single-file PPO."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.critic = nn.Sequential(nn.Linear(44, 32), nn.Tanh(), nn.Linear(32, 1))
-        self.mean = nn.Sequential(nn.Linear(44, 32), nn.Tanh(), nn.Linear(32, 5))
-        self.log_deviation = nn.Parameter(torch.full((1, 5), -1.5))
-
-    def act(self, seen: torch.Tensor, action: torch.Tensor | None = None) -> tuple[torch.Tensor, ...]:
-        chance = Normal(self.mean(seen), self.log_deviation.exp())
-        action = chance.sample() if action is None else action
-        return action, chance.log_prob(action).sum(1), self.critic(seen).flatten()
-
-
 def test_a_loop_in_the_form_of_single_file_learners_runs_and_updates():
     """Same-step resets, statistics from `infos`, the value of a truncated state from `final_obs`."""
     torch.manual_seed(0)
     envs: Any = gymnasium.make_vec("LunarHDA-v0", num_envs=8, max_episode_steps=6)
     envs = vector_wrappers.RecordEpisodeStatistics(vector_wrappers.ClipAction(envs))
-    agent = Agent()
+    agent = Agent(44, 5, -1.5)
     optimiser = torch.optim.Adam(agent.parameters(), lr=1e-3)
     before = [weights.detach().clone() for weights in agent.parameters()]
     seen, kept, episodic, cut = torch.from_numpy(envs.reset(seed=1)[0]), [], [], 0
     for _ in range(16):
         with torch.no_grad():
-            action, likelihood, _ = agent.act(seen)
+            chance = agent.distribution(seen)
+            action = chance.sample()
+            likelihood = chance.log_prob(action).sum(-1)
         following, reward, terminated, truncated, infos = envs.step(action.numpy())
         reward = torch.from_numpy(reward).float()
         if "final_info" in infos:
             episodic += infos["episode"]["r"][infos["_episode"]].tolist()
             only = torch.from_numpy(truncated & ~terminated)
             with torch.no_grad():
-                reward += 0.99 * agent.critic(torch.from_numpy(infos["final_obs"])).flatten() * only
+                reward += 0.99 * agent.value(torch.from_numpy(infos["final_obs"])) * only
             cut += int(only.sum())
         kept.append((seen, action, likelihood, reward))
         seen = torch.from_numpy(following)
     observations, actions, old, rewards = (torch.cat(parts) for parts in zip(*kept, strict=True))
-    _, likelihood, value = agent.act(observations, actions)
-    ratio, advantage = (likelihood - old).exp(), rewards - value
+    likelihood = agent.distribution(observations).log_prob(actions).sum(-1)
+    ratio, advantage = (likelihood - old).exp(), rewards - agent.value(observations)
     loss = -(ratio * advantage.detach()).mean() + advantage.square().mean()
     optimiser.zero_grad()
     loss.backward()
@@ -150,43 +137,6 @@ def test_a_loop_in_the_form_of_single_file_learners_runs_and_updates():
     assert np.isfinite(episodic).all()
     assert ratio.detach().numpy() == pytest.approx(1.0, abs=1e-4)
     assert all(not torch.equal(a, b) for a, b in zip(before, agent.parameters(), strict=True))
-
-
-@pytest.mark.parametrize("name", IDS)
-def test_torchrl_flies_what_a_vector_without_resets_flies(name):
-    reason = "TorchRL is not among the developers' packages"
-    libs = pytest.importorskip("torchrl.envs.libs.gym", reason=reason)
-    vectors = [gymnasium.make_vec(name, num_envs=2, autoreset_mode="Disabled") for _ in range(2)]
-    env = libs.GymWrapper(vectors[0])
-    env.set_seed(3)
-    rollout = env.rollout(25, break_when_any_done=False)
-    key = "observation" if name == "LunarHDA-v0" else "flight"
-    vectors[1].reset(seed=3)
-    vectors[1].reset()  # TorchRL resets once for the seed and once for the rollout
-    ends = 0
-    for k in range(25):
-        seen, reward, terminated, truncated, _ = vectors[1].step(rollout["action"][:, k].numpy())
-        flown, ended = rollout["next"][:, k], terminated | truncated
-        assert np.array_equal(flown[key].numpy(), seen[key] if isinstance(seen, dict) else seen)
-        assert np.array_equal(flown["reward"].numpy().ravel(), reward.astype(np.float32))
-        assert np.array_equal(flown["done"].numpy().ravel(), ended)
-        ends += int(ended.sum())
-        if ended.any():
-            vectors[1].reset(options={"reset_mask": ended})
-    assert ends > 2
-
-
-def test_a_recorder_of_videos_writes_one_for_an_episode(tmp_path):
-    pytest.importorskip("moviepy", reason="videos need MoviePy: gymnasium[other]")
-    env = wrappers.RecordVideo(
-        gymnasium.make("LunarHDA-Map-v0", render_mode="rgb_array"), str(tmp_path / "videos")
-    )
-    env.reset(seed=0)
-    while not any(env.step(np.zeros(5, np.float32))[2:4]):
-        pass
-    env.close()
-    (video,) = (tmp_path / "videos").glob("*.mp4")
-    assert video.stat().st_size > 10_000
 
 
 def test_a_recorder_of_single_episodes_finds_the_end():

@@ -18,25 +18,11 @@ from rl.environment.env import LunarHDAEnv, LunarHDAMapEnv
 from rl.learning.td3 import FastTD3
 from rl.training.vector_adapter import StableBaselinesVector
 from tests.equality import same
+from tests.rl.lanes import Lane
 
 
 def adapted(name: str = "LunarHDA-v0", count: int = 4, **options: Any) -> StableBaselinesVector:
     return StableBaselinesVector(gymnasium.make_vec(name, num_envs=count, **options))
-
-
-class Lane(gymnasium.Wrapper):
-    """Every n-th episode of a study, as a row flies them."""
-
-    def __init__(self, env: gymnasium.Env[Any, Any], seed: int, first: int, of: int) -> None:
-        super().__init__(env)
-        self.single: Any = env
-        self.single.continue_study(seed, first)
-        self.of = of
-
-    def reset(self, **_: Any) -> Any:
-        given = self.env.reset()
-        self.single.next_episode += self.of - 1
-        return given
 
 
 @pytest.mark.parametrize(
@@ -45,7 +31,7 @@ class Lane(gymnasium.Wrapper):
 def test_it_gives_what_the_vector_of_stable_baselines_gives(name, kind):
     count, limit = 3, {"max_episode_steps": 20}
     ours = adapted(name, count, **limit)
-    theirs = DummyVecEnv([lambda k=k: Lane(kind(), 5, k, count) for k in range(count)])
+    theirs = DummyVecEnv([lambda k=k: Lane(kind(), k, count, 5) for k in range(count)])
     ours.seed(5)
     seen, expected = ours.reset(), theirs.reset()
     assert same(seen, dict(expected) if isinstance(expected, dict) else expected)
@@ -90,7 +76,7 @@ def test_td3_remembers_the_transitions_that_were_flown(kind):
     buffer: Any = model.replay_buffer
     assert buffer.pos == rows
     for k in range(count):
-        lane = Lane(LunarHDAEnv(), 7, k, count)
+        lane = Lane(LunarHDAEnv(), k, count, 7)
         seen, _ = lane.reset()
         for row in range(rows):
             assert np.array_equal(buffer.observations[row, k], seen)
@@ -103,7 +89,8 @@ def test_td3_remembers_the_transitions_that_were_flown(kind):
 
 
 def test_an_episode_that_is_cut_is_no_end_of_the_task():
-    model = TD3("MlpPolicy", adapted(count=2, max_episode_steps=3), learning_starts=100, buffer_size=50)
+    vector = adapted(count=2, max_episode_steps=3)
+    model = TD3("MlpPolicy", vector, learning_starts=100, buffer_size=50, seed=7)
     model.learn(12)
     buffer: Any = model.replay_buffer
     assert buffer.dones[:6].all(axis=1).tolist() == [False, False, True] * 2
@@ -123,6 +110,33 @@ def test_ppo_learns_and_hears_of_every_end(name, policy):
     assert any(not torch.equal(a, b) for a, b in zip(before, after, strict=True))
     assert counted.ends == len(model.ep_info_buffer or ()) == len(model.ep_success_buffer or ()) > 4
     assert all(info["l"] < 20 for info in model.ep_info_buffer or ())
+
+
+def test_options_hold_for_every_environment_of_the_next_reset():
+    plain, changed, listed = adapted(count=2), adapted(count=2), adapted(count=2)
+    changed.set_options({"altitude": 0.0})
+    listed.set_options([{"altitude": 0.0}] * 2)
+    seen = []
+    for vector in (plain, changed, listed):
+        vector.seed(3)
+        seen.append(vector.reset())
+    assert not np.array_equal(seen[0], seen[1])
+    assert np.array_equal(seen[1], seen[2])
+    assert np.array_equal(plain.reset(), changed.reset())  # they hold once
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ([{"altitude": 0.0}, {}], "alike for all environments"),
+        ([{}], "must have 2 entries"),
+        ({"reset_mask": np.array([True, True])}, "leave out reset_mask"),
+    ],
+)
+def test_options_of_single_rows_are_refused(options, message):
+    vector = adapted(count=2)
+    with pytest.raises(ValueError, match=message):
+        vector.set_options(options)
 
 
 def test_what_is_not_of_rows_is_refused():
