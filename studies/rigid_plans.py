@@ -22,9 +22,10 @@ from rich.progress import track
 
 from guidance import solve_pdg_6dof
 from guidance.console import tolerate_encoding
+from guidance.pdg.solve import FEWEST_NODES
 from guidance.rigid_body import DEFAULT_BODY
 from guidance.rigid_descent import RigidPlan
-from guidance.successive.solve import DEFAULT_NODES, FEWEST_NODES, RigidPlanningMethod
+from guidance.successive.solve import DEFAULT_NODES, RigidPlanningMethod
 from guidance.validation import finite_number
 from hda.task.presets import find_preset
 from hda.task.scenario import sample_scenario

@@ -28,8 +28,7 @@ RigidPlanningMethod = Literal["successive", "casadi"]
 """Who plans: successive convexification, or the independent reference."""
 DEFAULT_NODES = 31
 """Nodes of a plan unless asked otherwise."""
-FEWEST_NODES = 5
-"""Least number of nodes that a plan may be asked for."""
+_FEWEST_NODES = 5
 
 
 def solve_pdg_6dof(
@@ -76,8 +75,8 @@ def solve_pdg_6dof(
             the nodes; nothing is proved. `error.plan` is of the type of every planner's: a Plan of the point
             mass without a flight, with this status and message. `throw=False` gives the RigidPlan itself.
     """
-    if isinstance(nodes, bool) or not isinstance(nodes, int | np.integer) or nodes < FEWEST_NODES:
-        raise ValueError(f"nodes must be an integer of at least {FEWEST_NODES}, got {nodes!r}")
+    if isinstance(nodes, bool) or not isinstance(nodes, int | np.integer) or nodes < _FEWEST_NODES:
+        raise ValueError(f"nodes must be an integer of at least {_FEWEST_NODES}, got {nodes!r}")
     problem = RigidLandingProblem(
         RigidState.parse(state),
         finite_vector("target", target, 3),
