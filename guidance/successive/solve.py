@@ -29,7 +29,6 @@ RigidPlanningMethod = Literal["successive", "casadi"]
 DEFAULT_NODES = 31
 """Nodes of a plan unless asked otherwise."""
 FEWEST_NODES = 5
-"""Least number of nodes that a plan may be asked for."""
 
 
 def solve_pdg_6dof(
