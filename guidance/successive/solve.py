@@ -29,6 +29,7 @@ RigidPlanningMethod = Literal["successive", "casadi"]
 DEFAULT_NODES = 31
 """Nodes of a plan unless asked otherwise."""
 FEWEST_NODES = 5
+"""Of a plan."""
 
 
 def solve_pdg_6dof(
