@@ -32,6 +32,7 @@ AGENTS = (
     "td3-partial",
     "td3-lstm-partial",
     "td3-lstm-plus-partial",
+    "td3-lidar",
 )
 """Names that `import rl` registers; this package may not import it, but may say so."""
 

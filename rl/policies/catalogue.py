@@ -57,6 +57,7 @@ _ENTRIES = (
         (weights_name(agent, "partial"), _agent(agent, "partial"))
         for agent in ("td3", "td3-lstm", "td3-lstm-plus")
     ),
+    (weights_name("td3", "lidar"), _agent("td3", "lidar")),
 )
 
 
