@@ -77,7 +77,7 @@ RESULTS: dict[str, Result] = {
         " nearest-safe nearest-safe+convex hazard-aware deferred-decision --out results/robustness_navigated",
     ),
     "faults": Result("robustness.md", "studies.faults"),
-    "rigid-plans": Result("../explanation/rigid-body.md", "studies.rigid_plans --starts 100"),
+    "rigid-plans": Result("../explanation/rigid-body.md", "studies.rigid_plans --starts 1000"),
     "scale": Result("scale.md", "studies.scale --episodes 1000 10000"),
 }
 """Name -> what is made, the README's first."""
