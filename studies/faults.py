@@ -30,10 +30,10 @@ from studies.campaign.points import Point, Rows, fly_points
 from studies.campaign.provenance import describe_run, identify_run, write_provenance
 from studies.campaign.run_options import FlyingOptions
 from studies.campaign.score import (
+    DROP_COLUMN,
     PROPELLANT_COLUMN,
     RATIO_COLUMNS,
     Score,
-    scaled,
     score_rows,
     success_drop,
 )
@@ -93,15 +93,7 @@ COLUMNS: tuple[Column[FaultRow], ...] = (
     Column("fault", "fault", lambda row: row.fault, words=True),
     Column("policy", "policy", lambda row: row.policy, words=True),
     *(column.through(lambda row: row.score) for column in (*RATIO_COLUMNS, PROPELLANT_COLUMN)),
-    Column(
-        "success_drop_points",
-        "drop",
-        lambda row: scaled(row.drop, 100.0),
-        digits=1,
-        unit="points",
-        interval=True,
-        stem="drop",
-    ),
+    DROP_COLUMN.through(lambda row: row.drop),
     Column("causes", "causes", lambda row: row.causes, words=True, outputs=Output.FILE | Output.DOCUMENT),
 )
 """The table: its file, document and console read this list; the console tells the causes below it."""

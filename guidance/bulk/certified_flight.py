@@ -27,7 +27,7 @@ from guidance.flight_time.path_limits import (
 from guidance.flight_time.primer_equations import LEAST_PULL, MOST_PULL, solve_primer, solve_touching
 from guidance.kernel import compile_kernel
 from guidance.lander import Lander
-from guidance.lower_bound.dual_case import DualCase, chord_growth
+from guidance.lower_bound.dual_case import DualCase, ThrustBounds, chord_growth
 from guidance.lower_bound.neighbour_cover import bound_by_neighbours
 from guidance.lower_bound.time_cover import GRANTED, TimeCover, claimed_bound
 
@@ -215,12 +215,14 @@ def bound_start(
         unit * problem.velocity,
         np.zeros(3),
         vehicle.gravity,
-        unit,
-        unit * chord_growth(most, exhaust),
-        0.0,
-        0.0,
-        max(vehicle.limits.least_cosine, -1.0),
-        vehicle.sine,
+        ThrustBounds(
+            unit,
+            unit * chord_growth(most, exhaust),
+            0.0,
+            0.0,
+            max(vehicle.limits.least_cosine, -1.0),
+            vehicle.sine,
+        ),
         0.0,
         0.0,  # no limit on the path: only the touch of the flight itself, as its primer has it, is used
         False,

@@ -19,7 +19,7 @@ import numpy as np
 from guidance.arrays import Array
 from guidance.flight_time.linear_system import dot, solve_linear
 from guidance.kernel import compile_kernel
-from guidance.lower_bound.dual_case import DualCase, thrust_bounds
+from guidance.lower_bound.dual_case import DualCase
 from guidance.lower_bound.dual_function import (
     AFFINE,
     THETA,
@@ -70,7 +70,7 @@ class Ascent(NamedTuple):
 @compile_kernel
 def relax_thrust(primer: Array, time: float, case: DualCase) -> RelaxedThrust:
     """The thrust of the relaxed flight of one duration [s] that a primer leads."""
-    step, bounds = time / STEPS, thrust_bounds(case)
+    step, bounds = time / STEPS, case.thrust
     whole = step_growth(step, bounds)
     directions, switching = np.empty((STEPS + 1, 3)), np.empty(STEPS + 1)
     slopes, weights = np.empty(STEPS), np.zeros(STEPS + 1)
@@ -244,7 +244,7 @@ def ascend(
         numbers[AFFINE] = dot(primer[AFFINE:THETA], limit) / dot(limit, limit)
     value = dual_value(primer, time, case, gradient)
     stalled = False
-    damping, size = _LEAST_DAMPING, case.full * time
+    damping, size = _LEAST_DAMPING, case.thrust.full * time
     for _ in range(_MOST_ITERATIONS):
         if value > enough:
             break

@@ -24,6 +24,26 @@ from guidance.descent.problem import LandingProblem
 from guidance.kernel import compile_kernel
 
 
+class ThrustBounds(NamedTuple):
+    """What inner loops read of a case: numbers alone, as each call with arrays would count their owners.
+
+    Attributes:
+        full: [m/s^2] f, full thrust over start mass.
+        full_growth: [1/s] f kappa.
+        least: [m/s^2] l, least thrust over start mass.
+        least_growth: [1/s] l/c.
+        cosine: of the pointing limit; -1 where there is none.
+        sine: of the pointing limit; 0 where there is none.
+    """
+
+    full: float
+    full_growth: float
+    least: float
+    least_growth: float
+    cosine: float
+    sine: float
+
+
 class DualCase(NamedTuple):
     """The relaxed problem, in SI, as the kernels read it.
 
@@ -32,12 +52,7 @@ class DualCase(NamedTuple):
         velocity: [m/s] shape (3,), at the start.
         arrival: [m/s] shape (3,), velocity at the target.
         gravity: [m/s^2] shape (3,).
-        full: [m/s^2] f, full thrust over start mass.
-        full_growth: [1/s] f kappa.
-        least: [m/s^2] l, least thrust over start mass.
-        least_growth: [1/s] l/c.
-        cosine: of the pointing limit; -1 where there is none.
-        sine: of the pointing limit; 0 where there is none.
+        thrust: bounds of the thrust.
         slope_cosine: of the glide slope limit; 0 where the altitude is the only limit.
         slope_sine: of the glide slope limit, 1 for the altitude; 0 to leave out both.
         anywhere: whether the landing point may lie anywhere in the target's plane: b is vertical then.
@@ -47,41 +62,10 @@ class DualCase(NamedTuple):
     velocity: Array
     arrival: Array
     gravity: Array
-    full: float
-    full_growth: float
-    least: float
-    least_growth: float
-    cosine: float
-    sine: float
+    thrust: ThrustBounds
     slope_cosine: float
     slope_sine: float
     anywhere: bool
-
-
-class ThrustBounds(NamedTuple):
-    """The numbers of a case that inner loops read; with arrays, each call would count their owners.
-
-    Attributes:
-        full: [m/s^2] f, full thrust over start mass.
-        full_growth: [1/s] f kappa.
-        least: [m/s^2] l, least thrust over start mass.
-        least_growth: [1/s] l/c.
-        cosine: of the pointing limit; -1 where there is none.
-        sine: of the pointing limit; 0 where there is none.
-    """
-
-    full: float
-    full_growth: float
-    least: float
-    least_growth: float
-    cosine: float
-    sine: float
-
-
-@compile_kernel
-def thrust_bounds(case: DualCase) -> ThrustBounds:
-    """The bounds on the thrust of a case."""
-    return ThrustBounds(case.full, case.full_growth, case.least, case.least_growth, case.cosine, case.sine)
 
 
 @compile_kernel
@@ -105,12 +89,14 @@ def dual_case(problem: LandingProblem, most: float, anywhere: bool = False) -> D
         np.array(problem.state.velocity),
         np.array(problem.target_velocity),  # copies: kernels compile once for arrays that may be written
         np.array(problem.gravity),
-        full,
-        full * chord_growth(most, exhaust),
-        least,
-        least / exhaust,
-        math.cos(limit),
-        math.sin(limit) if limit < math.pi else 0.0,
+        ThrustBounds(
+            full,
+            full * chord_growth(most, exhaust),
+            least,
+            least / exhaust,
+            math.cos(limit),
+            math.sin(limit) if limit < math.pi else 0.0,
+        ),
         math.cos(slope) if slopes else 0.0,
         math.sin(slope) if slopes else 1.0,
         anywhere,

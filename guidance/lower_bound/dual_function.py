@@ -36,7 +36,7 @@ import numpy as np
 
 from guidance.arrays import Array
 from guidance.kernel import compile_kernel
-from guidance.lower_bound.dual_case import DualCase, ThrustBounds, thrust_bounds
+from guidance.lower_bound.dual_case import DualCase, ThrustBounds
 
 AFFINE = 6
 """Numbers of a primer (a, b); one with a limit on the path has c and theta besides."""
@@ -177,7 +177,7 @@ def sweep_bound(primer: Array, times: Array, case: DualCase, lowest: Array) -> N
         case: the relaxed problem.
         lowest: [m/s] shape (n,), the answer.
     """
-    directions, bounds = np.empty((1, 3)), thrust_bounds(case)
+    directions, bounds = np.empty((1, 3)), case.thrust
     bend, kink = 0.0, 0.0
     for axis in range(3):
         bend -= primer[3 + axis] * case.gravity[axis]

@@ -69,7 +69,7 @@ def primer_of(x: Extremal, case: DualCase) -> Array:
     for axis in range(3):
         slope = (x.primer[0, axis] - x.primer[1, axis]) / (x.times[1] - x.times[0])
         primer[axis], primer[3 + axis] = x.primer[1, axis] - slope * burn, slope
-    rate = case.full_growth
+    rate = case.thrust.full_growth
     total = 0.0
     for k in range(_POINTS.size):
         tau, square = 0.5 * burn * (1.0 + _POINTS[k]), 0.0

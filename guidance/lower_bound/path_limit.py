@@ -126,7 +126,7 @@ def keep_path(found: Ascent, time: float, case: DualCase, tolerance: float, enou
         if best.value > enough:
             break
         breach = find_breach(flown, time, case)
-        if not breach.depth > _FELT * case.full * time * time:
+        if not breach.depth > _FELT * case.thrust.full * time * time:
             break
         start = best.primer.copy()
         start[AFFINE:THETA], start[THETA] = 0.0, breach.theta

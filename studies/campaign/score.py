@@ -214,6 +214,17 @@ MEASURE_COLUMNS = (
 )
 """The means, in the order of MEASURES."""
 
+DROP_COLUMN: Column[Interval] = Column(
+    "success_drop_points",
+    "drop",
+    lambda drop: scaled(drop, 100.0),
+    digits=1,
+    unit="points",
+    interval=True,
+    stem="drop",
+)
+"""What `success_drop` gives, in points."""
+
 PROPELLANT_COLUMN = next(column for column in MEASURE_COLUMNS if column.key == "propellant_percent")
 
 FALLBACKS_COLUMN: Column[Score] = Column("fallbacks", "fallbacks", lambda score: score.fallbacks)

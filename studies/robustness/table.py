@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from hda.registry import policy_entry
 from studies.campaign.points import Rows
 from studies.campaign.score import (
+    DROP_COLUMN,
     PROPELLANT_COLUMN,
     RATIO_COLUMNS,
     Score,
-    scaled,
     score_rows,
     success_drop,
 )
@@ -99,7 +99,7 @@ LEVEL_COLUMNS: tuple[Column[LevelRow], ...] = (
     Column("privileged", "privileged", lambda row: policy_entry(row.policy).privileged),
     Column("episodes", "episodes", lambda row: row.score.episodes),
     *(column.through(lambda row: row.score) for column in (*RATIO_COLUMNS, PROPELLANT_COLUMN)),
-    Column("success_drop_points", "drop", lambda row: scaled(row.drop, 100.0), interval=True, stem="drop"),
+    DROP_COLUMN.through(lambda row: row.drop),
     *(_ending_column(ending) for ending in _FAILURES),
 )
 """A factor's file: every level and policy, ratios in percent."""
@@ -111,15 +111,7 @@ BREAK_COLUMNS: tuple[Column[Break], ...] = (
     Column("policy", "policy", lambda row: row.policy, words=True),
     Column("level", "breaks at", lambda row: row.level, form="{:g}".format),
     Column("success_percent", "success", lambda row: 100.0 * row.success, digits=1, unit="%"),
-    Column(
-        "drop_points",
-        "drop",
-        lambda row: scaled(row.drop, 100.0),
-        digits=1,
-        unit="points",
-        interval=True,
-        stem="drop",
-    ),
+    replace(DROP_COLUMN.through(lambda row: row.drop), key="drop_points"),
     Column("ending", "by", lambda row: row.ending, words=True),
     Column("more_failures", "more failures", lambda row: row.more, outputs=Output.FILE),
     Column("causes", "causes", lambda row: row.causes, words=True),

@@ -123,12 +123,13 @@ def time_batch(kind: str, first: int, count: int) -> AnswerBatch:
 def measure_answers(starts: int, journal: Journal[AnswerBatch]) -> list[AnswerTime]:
     """Time the answers to `starts` starts of each kind; batches in the journal are not asked again."""
     times: dict[tuple[str, str], list[float]] = defaultdict(list)
-    spans = [(kind, first) for kind in KINDS for first in range(0, starts, _BATCH)]
-    for kind in KINDS:
+    spans = [
+        (kind, first, min(_BATCH, starts - first)) for kind in KINDS for first in range(0, starts, _BATCH)
+    ]
+    for kind in dict.fromkeys(span[0] for span in spans if journal.find(span) is None):
         time_batch(kind, starts, _FIRST)
-    for kind, first in track(spans, "answers", transient=True):
-        count = min(_BATCH, starts - first)
-        batch = journal.finish((kind, first, count), lambda k=kind, f=first, c=count: time_batch(k, f, c))
+    for span in track(spans, "answers", transient=True):
+        kind, batch = span[0], journal.finish(span, lambda span=span: time_batch(*span))
         for answer, seconds in zip(batch.answers, batch.seconds, strict=True):
             times[kind, answer].append(seconds)
     return [sum_up(kind, answer, values) for (kind, answer), values in sorted(times.items())]

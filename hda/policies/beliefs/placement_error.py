@@ -71,8 +71,8 @@ class Placement:
         if not number_deviations(self.variance, np.float32(self.newest), number):
             return safe
         along, out = np.empty_like(safe), np.empty_like(safe)
-        _mean_along(safe, number, cell_weights(), along)
-        _mean_across(along, number, cell_weights(), out)
+        _mean_along(safe, number, cell_weights(), (0, 1), along)
+        _mean_along(along, number, cell_weights(), (1, 0), out)
         return out
 
 
@@ -105,10 +105,18 @@ def number_deviations(variance: NDArray[np.float32], newest: np.float32, number:
 
 @compile_kernel
 def _mean_along(
-    values: NDArray[np.float32], number: NDArray[np.int8], weights: Array, out: NDArray[np.float32]
+    values: NDArray[np.float32],
+    number: NDArray[np.int8],
+    weights: Array,
+    way: tuple[int, int],
+    out: NDArray[np.float32],
 ) -> None:
-    """Weighted mean along each row with the weights of each cell's number; the last cell goes on outside."""
-    last = values.shape[1] - 1
+    """Weighted mean along a way of (rows, columns) to the next cell; the last cell goes on outside.
+
+    Each cell has the weights of its number.
+    """
+    down, right = way
+    last, end = values.shape[0] - 1, values.shape[1] - 1
     for i in range(values.shape[0]):
         for j in range(values.shape[1]):
             own = np.uint64(number[i, j])
@@ -120,26 +128,7 @@ def _mean_along(
                 weight = weights[own, k]
                 if weight == 0.0:
                     break
-                total += weight * (values[i, max(j - k, 0)] + values[i, min(j + k, last)])
-            out[i, j] = total
-
-
-@compile_kernel
-def _mean_across(
-    values: NDArray[np.float32], number: NDArray[np.int8], weights: Array, out: NDArray[np.float32]
-) -> None:
-    """The same along each column."""
-    last = values.shape[0] - 1
-    for i in range(values.shape[0]):
-        for j in range(values.shape[1]):
-            own = np.uint64(number[i, j])
-            if own == 0:
-                out[i, j] = values[i, j]
-                continue
-            total = weights[own, 0] * values[i, j]
-            for k in range(1, _REACH + 1):
-                weight = weights[own, k]
-                if weight == 0.0:
-                    break
-                total += weight * (values[max(i - k, 0), j] + values[min(i + k, last), j])
+                before = values[max(i - down * k, 0), max(j - right * k, 0)]
+                after = values[min(i + down * k, last), min(j + right * k, end)]
+                total += weight * (before + after)
             out[i, j] = total

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from guidance import PAPER_LANDER, State
 from guidance.descent.problem import LandingProblem
 from guidance.lower_bound.dual_ascent import affine_basis, ascend, dual_value, two_impulse_primer
-from guidance.lower_bound.dual_case import dual_case, thrust_bounds
+from guidance.lower_bound.dual_case import dual_case
 from guidance.lower_bound.dual_function import linear_part, support, sweep_bound
 
 
@@ -64,7 +64,7 @@ def test_the_gradient_is_that_of_the_value(seed):
     for axis, unit in enumerate(np.diag(1e-5 * units)):
         ends = [dual_value(primer + sign * unit, time, case, unused) for sign in (1.0, -1.0)]
         slope = (ends[0] - ends[1]) / 2e-5
-        scale = case.full * time + np.linalg.norm(case.gravity) * time + abs(slope)
+        scale = case.thrust.full * time + np.linalg.norm(case.gravity) * time + abs(slope)
         assert gradient[axis] * units[axis] == pytest.approx(slope, abs=1e-4 * float(scale))
 
 
@@ -94,7 +94,7 @@ def test_the_support_function_is_the_greatest_product_over_the_cone():
         angle = lean * (np.pi if limit is None else limit)
         cone = np.stack([np.sin(angle) * np.cos(turn), np.sin(angle) * np.sin(turn), np.cos(angle)])
         for primer in rng.normal(0.0, 1.0, (20, 6)):
-            value = support(primer, 2.0, thrust_bounds(case), direction, 0)
+            value = support(primer, 2.0, case.thrust, direction, 0)
             p = primer[:3] + 2.0 * primer[3:]
             assert value == pytest.approx(np.tensordot(p, cone, 1).max(), abs=2e-4 * float(np.linalg.norm(p)))
             assert value == pytest.approx(p @ direction[0], abs=1e-12)

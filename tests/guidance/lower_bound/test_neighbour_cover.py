@@ -52,7 +52,7 @@ def test_the_primer_lights_the_engine_where_the_extremal_brakes():
 
         def slope(time, s, primer=primer, case=case):
             p = primer[:3] + time * primer[3:]
-            return [p @ primer[3:] / np.linalg.norm(p) + case.full_growth * s[0]]
+            return [p @ primer[3:] / np.linalg.norm(p) + case.thrust.full_growth * s[0]]
 
         first = float(np.linalg.norm(primer[:3])) - 1.0
         run = solve_ivp(slope, (0.0, burn), [first], rtol=1e-10, atol=1e-12)

@@ -7,21 +7,10 @@ import pytest
 
 from guidance import Lander, PlanStatus, solve_pdg, solve_pdg_6dof
 from guidance.rigid_body import RigidBody, RigidState, attitude_along
+from tests.guidance.rigid_body.rigid_cases import plan_szmuk_case
 
 SITE = np.array([0.0, 0.0, 50.0])
 START = [200.0, 100.0, 950.0, -8.0, -4.0, -30.0, 1200.0]
-SZMUK = RigidBody(
-    Lander(dry_mass=1.0, max_thrust=5.0, min_thrust=0.3, specific_impulse=100.0 / 9.80665),
-    inertia=(0.01, 0.01, 0.01),
-    inertia_mass=2.0,
-    inertia_exponent=0.0,
-    torque_limit=(0.0, 0.0, 0.0),
-    rate_limit=math.radians(60.0),
-    tilt_limit=math.radians(90.0),
-    engine_lag=0.0,
-    gimbal_limit=math.radians(20.0),
-    engine_arm=0.01,
-)
 
 
 @pytest.mark.parametrize("turned", [False, True])
@@ -46,19 +35,7 @@ def test_both_methods_find_the_same_optimum_to_a_tenth_of_a_kilogramme(turned):
 @pytest.mark.slow
 def test_the_case_of_szmuk_and_acikmese_by_the_reference():
     """3.3901 time units, by an independent reproduction of AIAA 2018-0617, table 1 and 2."""
-    state = RigidState(np.array([4.0, 0.0, 4.0]), np.array([-4.0, 0.0, 0.0]), 2.0)
-    flight = solve_pdg_6dof(
-        state,
-        [0.0, 0.0, 0.0],
-        SZMUK,
-        gravity=(0.0, 0.0, -1.0),
-        target_velocity=(0.0, 0.0, -0.1),
-        glide_slope_limit=math.radians(70.0),
-        free_attitude=True,
-        objective="time",
-        nodes=30,
-        method="casadi",
-    )
+    flight = plan_szmuk_case(nodes=30, method="casadi")
     assert flight.time_of_flight == pytest.approx(3.3901, abs=0.01)
     assert flight.propellant == pytest.approx(0.1427, abs=1e-3)
 
