@@ -18,11 +18,8 @@ from rich.progress import track
 
 from guidance.console import tolerate_encoding
 from guidance.validation import finite_number, unknown_name
-from hda.flight.episode import fly
-from hda.flight.episode_row import EpisodeRow
 from hda.navigation.system import NAVIGATION_FAULTS, add_fault
 from hda.task.presets import Preset, find_preset
-from hda.task.scenario import sample_scenario
 from studies.campaign.command_line import choose_policies, open_folder, resumable
 from studies.campaign.journal import Journal, open_journal
 from studies.campaign.monte_carlo import Study
@@ -38,7 +35,8 @@ from studies.campaign.score import (
     success_drop,
 )
 from studies.columns import Column, Output, console_table, write_csv, write_markdown
-from studies.failures.causes import Failure, count_causes, explain_failure
+from studies.failures.causes import Failure
+from studies.failures.explained import explain_episodes
 from studies.statistics.ratios import Interval
 
 NO_FAULT = "no-fault"
@@ -131,23 +129,6 @@ def plan_points(options: Faults) -> list[Point]:
     ]
 
 
-def explain_failures(point: Point, rows: Sequence[EpisodeRow], most: int, journal: Journal[Failure]) -> str:
-    """Causes of a policy's first failures, each flown again unless the journal holds it, in words."""
-    study, pilot = point.study, point.study.make_policy(rows[0].policy)
-
-    def explain(episode: int) -> Failure:
-        scenario = sample_scenario(study.preset, study.study_seed, episode, study.split)
-        return explain_failure(fly(pilot, scenario))
-
-    failed = [row for row in rows if not row.success][:most]
-    return "; ".join(
-        count_causes(
-            journal.finish((point.label, row.policy, row.episode), lambda row=row: explain(row.episode))
-            for row in failed
-        )
-    )
-
-
 def tabulate(
     points: Sequence[Point], flown: Mapping[str, Rows], most: int, journal: Journal[Failure]
 ) -> list[FaultRow]:
@@ -157,7 +138,8 @@ def tabulate(
     for point, policy in track(pairs, "explaining failures", transient=True):
         rows = flown[point.label][policy]
         drop = success_drop(own[policy], rows)
-        causes = explain_failures(point, rows, most, journal)
+        failed = [row.episode for row in rows if not row.success][:most]
+        causes = explain_episodes(point, policy, failed, journal)
         lines.append(FaultRow(point.label, policy, score_rows(rows), drop, causes))
     return lines
 

@@ -53,6 +53,7 @@ GROUPS: dict[str, dict[str, Command]] = {
             "studies.robustness.command", "Robustness", "one factor after the other is made worse"
         ),
         "faults": Command("studies.faults", "Faults", "each fault of the navigation sensors"),
+        "realism": Command("studies.realism.command", "Realism", "what each layer of reality costs a policy"),
         "failures": Command("studies.failures.command", "Failures", "why episodes of a comparison failed"),
         "memory": Command("studies.memory.command", "MemoryStudy", "when memory helps an agent"),
         "stability": Command(

@@ -77,6 +77,11 @@ RESULTS: dict[str, Result] = {
         " nearest-safe nearest-safe+convex hazard-aware deferred-decision --out results/robustness_navigated",
     ),
     "faults": Result("robustness.md", "studies.faults"),
+    "measured": Result(
+        "realism.md",
+        "studies.realism --presets paper lidar lidar-coarse --episodes 1000 --out results/measured",
+    ),
+    "realism": Result("realism.md", "studies.realism --episodes 1000"),
     "rigid-plans": Result("../explanation/rigid-body.md", "studies.rigid_plans --starts 1000"),
     "scale": Result("scale.md", "studies.scale --episodes 1000 10000"),
 }

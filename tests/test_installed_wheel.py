@@ -54,6 +54,10 @@ RUNS: dict[str, tuple[list[str], list[str]]] = {
         [*SMALL, "--faults", "velocimeter-lost", "--policies", "no-divert", "--out", "faulty"],
         ["faulty/table.csv", "faulty/table.md"],
     ),
+    "studies.realism": (
+        [*SMALL, "--presets", "paper", "partial", "--policies", "single-divert", "--out", "layered"],
+        ["layered/table.csv", "layered/order.md", "layered/realism.png"],
+    ),
     "studies.failures": (["--study", "failing", "--out", "failed"], ["failed/failures.csv"]),
     "studies.looks": (
         [

@@ -9,6 +9,8 @@ COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#B87A00", "#3D94D1", "#00
 that each line has a contrast of 3 on white (WCAG 2.1, 1.4.11)."""
 
 DASHES = ("solid", "dash", "dot")
+MATPLOTLIB_DASHES = {"solid": "-", "dash": "--", "dot": ":"}
+"""The same for Matplotlib, which names them otherwise."""
 SYMBOLS = ("circle", "square", "diamond")
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hda.flight.palette import line_style
+from hda.flight.palette import MATPLOTLIB_DASHES, line_style
 from studies.campaign.points import Rows
 from studies.statistics.ratios import wilson_interval
 
@@ -46,7 +46,7 @@ def draw_sweep(label: str, own: float, levels: Mapping[float, Rows]) -> Figure:
                 middle,
                 yerr=(middle - low, high - middle),
                 color=style["color"],
-                linestyle={"dash": "--", "dot": ":"}.get(style["dash"], "-"),
+                linestyle=MATPLOTLIB_DASHES[style["dash"]],
                 marker="o",
                 markersize=3.5,
                 linewidth=1.3,

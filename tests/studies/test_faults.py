@@ -8,9 +8,9 @@ import pytest
 
 from hda.navigation import NAVIGATION_FAULTS, add_fault
 from hda.task.presets import PRESETS
-from studies import faults
 from studies.campaign import monte_carlo
 from studies.campaign.claimed_folder import FolderError
+from studies.failures import explained
 from studies.faults import NO_FAULT, Faults, fault_presets, plan_points, run_faults
 
 
@@ -73,7 +73,7 @@ def test_a_run_tells_why_and_goes_on_without_flying_again(
     def refuse(*arguments: object) -> None:
         raise AssertionError("it was flown again")
 
-    for module in (faults, monte_carlo):  # explains; flies the points
+    for module in (explained, monte_carlo):  # explains; flies the points
         monkeypatch.setattr(module, "fly", refuse)
     with pytest.raises(FolderError, match="holds a study already"):
         run_faults(options)

@@ -1,0 +1,235 @@
+"""What a layer of reality costs: the paired fall of success from setting to setting, and the policies' order.
+
+Settings share ground and starts, so an episode of a number is the same descent in each; what differs is what
+the lander knows and how it flies.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from itertools import combinations
+
+import numpy as np
+
+from hda.flight.episode_row import EpisodeRow
+from hda.registry import policy_entry
+from studies.campaign.points import Rows
+from studies.campaign.score import (
+    DROP_COLUMN,
+    PROPELLANT_COLUMN,
+    RATIO_COLUMNS,
+    Score,
+    scaled,
+    score_rows,
+    success_drop,
+)
+from studies.columns import Column, Output
+from studies.statistics.moments import collect_moments, mean_intervals
+from studies.statistics.paired import paired_ratio_interval
+from studies.statistics.ratios import Interval
+
+_NOTHING = Interval(math.nan, math.nan, math.nan)
+
+
+@dataclass(frozen=True)
+class LayerRow:
+    """One policy in one setting.
+
+    Attributes:
+        preset: name of the setting.
+        policy: name.
+        score: every figure with its intervals.
+        step: fall of the ratio of successes against the setting before, paired; nan in the first.
+        fall: the same against the first setting.
+        price: rise of the propellant against the first setting [%], paired, clustered by tile; nan in it.
+        lost: episodes that succeed in the setting before and fail here; in the first, those that fail.
+        causes: of the first of these, in words.
+    """
+
+    preset: str
+    policy: str
+    score: Score
+    step: Interval
+    fall: Interval
+    price: Interval
+    lost: int
+    causes: str
+
+
+def lost_episodes(before: Sequence[EpisodeRow] | None, rows: Sequence[EpisodeRow]) -> list[int]:
+    """Episodes that fail here and not in the setting before; without one, those that fail."""
+    fine = [True] * len(rows) if before is None else [row.success for row in before]
+    return [row.episode for row, was in zip(rows, fine, strict=True) if was and not row.success]
+
+
+def propellant_rise(first: Sequence[EpisodeRow], rows: Sequence[EpisodeRow]) -> Interval:
+    """[%] what a setting costs in propellant, over the same episodes, clustered by tile."""
+    more = [row.propellant_percent - own.propellant_percent for own, row in zip(first, rows, strict=True)]
+    return mean_intervals(collect_moments(more, [row.tile for row in rows]), 0)[1]
+
+
+def describe_layer(
+    flown: Mapping[str, Rows], preset: str, policy: str, explain: Callable[[list[int]], str]
+) -> LayerRow:
+    """The line of a policy in a setting.
+
+    Args:
+        flown: setting -> rows of each policy, from the first setting to the last.
+        preset: name of the setting.
+        policy: its name.
+        explain: gives the causes of failed episodes in words.
+    """
+    layers, rows = list(flown), flown[preset][policy]
+    place, score = layers.index(preset), score_rows(rows)
+    if place == 0:
+        lost = lost_episodes(None, rows)
+        return LayerRow(preset, policy, score, _NOTHING, _NOTHING, _NOTHING, len(lost), explain(lost))
+    first, before = flown[layers[0]][policy], flown[layers[place - 1]][policy]
+    lost, step, fall = lost_episodes(before, rows), success_drop(before, rows), success_drop(first, rows)
+    price = propellant_rise(first, rows)
+    return LayerRow(preset, policy, score, step, fall, price, len(lost), explain(lost))
+
+
+class Verdict(StrEnum):
+    """What becomes of the order of two policies from the first setting to the last."""
+
+    KEPT = "kept"
+    REVERSED = "reversed"
+    LOST = "no longer decided"
+    NEW = "decided only at the end"
+    NONE = "never decided"
+
+
+@dataclass(frozen=True)
+class PairRow:
+    """Two policies in every setting, on the same episodes.
+
+    Attributes:
+        better: the one with more successes in the first setting; the registry's order decides equal numbers.
+        other: the other.
+        leads: by how much `better` leads in each setting, a ratio with its paired 95 % interval.
+        fall: by how much more `better` falls than `other` from the first setting to the last: a ratio with
+            its 95 % interval, clustered by tile.
+        verdict: what becomes of their order.
+    """
+
+    better: str
+    other: str
+    leads: tuple[Interval, ...]
+    fall: Interval
+    verdict: Verdict
+
+
+def judge_order(first: Interval, last: Interval) -> Verdict:
+    """What becomes of a lead whose estimate in the first setting is not negative."""
+    if first.low > 0.0:
+        if last.low > 0.0:
+            return Verdict.KEPT
+        return Verdict.REVERSED if last.high < 0.0 else Verdict.LOST
+    return Verdict.NEW if last.low > 0.0 or last.high < 0.0 else Verdict.NONE
+
+
+def compare_order(flown: Mapping[str, Rows]) -> list[PairRow]:
+    """Every pair of policies that may be compared: those that see the true map are left out.
+
+    Args:
+        flown: setting -> rows of each policy, from the first setting to the last.
+    """
+    layers = list(flown.values())
+    found = []
+    for pair in combinations([name for name in layers[0] if not policy_entry(name).privileged], 2):
+        hits = [sum(row.success for row in layers[0][name]) for name in pair]
+        better, other = pair if hits[0] >= hits[1] else pair[::-1]
+        leads = tuple(_lead(layer[better], layer[other]) for layer in layers)
+        fall = extra_fall(layers[0], layers[-1], better, other)
+        found.append(PairRow(better, other, leads, fall, judge_order(leads[0], leads[-1])))
+    return found
+
+
+def _lead(better: Sequence[EpisodeRow], other: Sequence[EpisodeRow]) -> Interval:
+    return paired_ratio_interval([row.success for row in better], [row.success for row in other])
+
+
+def extra_fall(first: Rows, last: Rows, policy: str, other: str) -> Interval:
+    """By how much more a policy falls than another from one setting to another, episode by episode.
+
+    Returns:
+        A ratio with its 95 % interval, clustered by tile.
+    """
+    falls = [
+        np.array([own.success - row.success for own, row in zip(first[name], last[name], strict=True)], float)
+        for name in (policy, other)
+    ]
+    tiles = [row.tile for row in last[policy]]
+    return mean_intervals(collect_moments(falls[0] - falls[1], tiles), 0)[1]
+
+
+LAYER_COLUMNS: tuple[Column[LayerRow], ...] = (
+    Column("preset", "preset", lambda row: row.preset, words=True),
+    Column(
+        "policy",
+        "policy",
+        lambda row: row.policy,
+        words=True,
+        mark=lambda row: " *" if policy_entry(row.policy).privileged else "",
+    ),
+    *(column.through(lambda row: row.score) for column in (*RATIO_COLUMNS, PROPELLANT_COLUMN)),
+    Column(
+        "step_points",
+        "step",
+        lambda row: scaled(row.step, 100.0),
+        digits=1,
+        unit="points",
+        interval=True,
+        stem="step",
+    ),
+    DROP_COLUMN.through(lambda row: row.fall),
+    Column(
+        "price_points",
+        "price",
+        lambda row: row.price,
+        unit="points",
+        interval=True,
+        form="{:+.2f}".format,
+        stem="price",
+        between=" to ",
+    ),
+    Column("lost", "lost", lambda row: row.lost),
+    Column("causes", "causes", lambda row: row.causes, words=True, outputs=Output.FILE | Output.DOCUMENT),
+)
+"""A line for each setting and policy: `step` against the one before, `drop`, `price` against the first."""
+
+
+def pair_columns(presets: Sequence[str]) -> tuple[Column[PairRow], ...]:
+    """Columns of the pairs: their leads in each setting, and what becomes of them."""
+    return (
+        Column("better", "better", lambda row: row.better, words=True),
+        Column("other", "other", lambda row: row.other, words=True),
+        *(
+            Column(
+                f"{preset.replace('-', '_')}_points",
+                f"lead on {preset}",
+                lambda row, k=k: scaled(row.leads[k], 100.0),
+                unit="points",
+                interval=True,
+                form="{:+.1f}".format,
+                between=" to ",
+                stem=preset.replace("-", "_"),
+            )
+            for k, preset in enumerate(presets)
+        ),
+        Column(
+            "extra_fall_points",
+            "falls more by",
+            lambda row: scaled(row.fall, 100.0),
+            unit="points",
+            interval=True,
+            form="{:+.1f}".format,
+            between=" to ",
+            stem="extra_fall",
+        ),
+        Column("verdict", "order", lambda row: row.verdict.value, words=True),
+    )
