@@ -22,6 +22,7 @@ from rl.environment.env import (
     LunarHDAMapEnv,
     refuse_unknown_options,
 )
+from rl.environment.episode_source import EpisodeSource
 from rl.environment.flight_batch import BatchSettings, FlightBatch, check_count
 from rl.environment.vector_info import Mask, blank_others, describe_batch, with_masks
 from rl.inference.arrays import Array32
@@ -174,6 +175,16 @@ class LandingVectorEnv(VectorEnv[Seen, Array32, Any], Generic[Seen]):
         info |= with_masks(describe_batch(batch), everyone)
         return self._observation(), rewards, terminated, truncated, info
 
+    def look_again(self) -> Seen:
+        """Take the look of this instant anew in every environment, for whoever has set its flights."""
+        self._look(np.ones(self.num_envs, np.bool_))
+        return self._observation()
+
+    @property
+    def source(self) -> EpisodeSource:
+        """Which episodes are flown."""
+        return self.single.source
+
     def render(self) -> None:
         """None: a batch draws no pictures."""
 
@@ -183,9 +194,8 @@ class LandingVectorEnv(VectorEnv[Seen, Array32, Any], Generic[Seen]):
 
     def _draw(self, study: int, episodes: Index, mask: Mask, changes: dict[str, float]) -> list[Scenario]:
         """The next episode of each environment of a mask, with changed dispersions."""
-        source = self.single.source
-        source.prepare()
-        return [source.scenario(study, episode, changes) for episode in episodes[mask].tolist()]
+        self.source.prepare()
+        return [self.source.scenario(study, episode, changes) for episode in episodes[mask].tolist()]
 
     def _begin(self, mask: Mask, scenarios: list[Scenario]) -> None:
         """Begin an episode in each environment of a mask."""

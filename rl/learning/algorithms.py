@@ -8,10 +8,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rl.environment.action import CONTROLS
-from rl.settings import AgentSettings, RecurrentSettings, SequenceSettings
+from rl.settings import (
+    AgentSettings,
+    OffPolicyAgentSettings,
+    OnPolicySettings,
+    RecurrentSettings,
+    SequenceSettings,
+)
 
 if TYPE_CHECKING:
     from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
+    from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 
     from rl.learning.recurrent.td3_lstm import RecurrentTD3
 
@@ -29,23 +36,34 @@ def make_agent_with_memory(settings: RecurrentSettings, env: Any, seed: int) -> 
     return agent
 
 
-def make_algorithm(settings: AgentSettings, env: Any, seed: int) -> OffPolicyAlgorithm | RecurrentTD3:
+def make_algorithm(
+    settings: AgentSettings, env: Any, seed: int
+) -> OffPolicyAlgorithm | OnPolicyAlgorithm | RecurrentTD3:
     """Make an untrained algorithm.
 
     Args:
         settings: what is learnt.
-        env: Gymnasium environment.
+        env: Gymnasium environment; for what learns from many at a time Stable-Baselines3's `VecEnv`.
         seed: of the first weights, the exploration and the episodes.
 
     Raises:
         ValueError: unknown algorithm, or spaces that are not one-dimensional boxes, finite for actions.
-        ImportError: `tqc` without sb3-contrib.
+        ImportError: `tqc` or `recurrent-ppo` without sb3-contrib.
     """
     from rl.learning.box_spaces import check_environment
+    from rl.learning.ppo import make_on_policy
 
+    if isinstance(settings, OnPolicySettings):
+        return make_on_policy(settings, env, seed)
     check_environment(env)
     if isinstance(settings, RecurrentSettings):
         return make_agent_with_memory(settings, env, seed)
+    assert isinstance(settings, OffPolicyAgentSettings)
+    return make_off_policy(settings, env, seed)
+
+
+def make_off_policy(settings: OffPolicyAgentSettings, env: Any, seed: int) -> OffPolicyAlgorithm:
+    """Make an untrained agent without memory that learns from a replay memory; as `make_algorithm`."""
     from stable_baselines3 import DDPG, SAC
     from stable_baselines3.common.noise import NormalActionNoise
 

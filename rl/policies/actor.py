@@ -19,6 +19,17 @@ from rl.inference.arrays import Array32
 from rl.inference.artefacts import WEIGHTS_FOLDER, Artefact, ArtefactError, load_artefact, require
 from rl.inference.latent import LATENT_SIZE, encoder_of_card, load_encoder
 from rl.inference.networks import MapEncoder, Perceptron
+from rl.settings import ON_POLICY_ALGORITHMS
+
+
+def bound_action(inputs: Array32, algorithm: str) -> Array32:
+    """The action in [-1, 1] that an actor's last layer means: of proximal policies the mean, else its tanh.
+
+    Args:
+        inputs: shape (a,), of the last layer.
+        algorithm: that it was trained by.
+    """
+    return np.clip(inputs, -1.0, 1.0) if algorithm in ON_POLICY_ALGORITHMS else np.tanh(inputs)
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,27 +39,29 @@ class Actor:
     Attributes:
         layout: observation vector that it was trained on.
         encoder: makes the latent of a map.
-        network: its dense layers; tanh follows.
+        network: its dense layers.
         ranges: what its actions mean.
+        algorithm: that it was trained by, which says how its actions are bounded.
     """
 
     layout: Layout
     encoder: MapEncoder
     network: Perceptron
     ranges: ActionRanges = PAPER_ACTIONS
+    algorithm: str = "td3"
 
     def act(self, observation: Observation, nominal_target: Array) -> Array32:
         """Action of shape (5,) in [-1, 1]."""
         latent = self.encoder.encode(observation.safety_map)
         vector = encode_observation(self.layout, observation, nominal_target, latent)
-        return np.tanh(self.network.evaluate(vector))
+        return bound_action(self.network.evaluate(vector), self.algorithm)
 
     def decide(self, observation: Observation, nominal_target: Array) -> Decision:
         """Decision of the action."""
         return decide_action(self.act(observation, nominal_target), observation, self.ranges)
 
 
-def read_actor_card(card: dict[str, Any], path: Path) -> tuple[Layout, list[int], ActionRanges]:
+def read_actor_card(card: dict[str, Any], path: Path) -> tuple[Layout, tuple[int, ...], ActionRanges]:
     """Layout, sizes of the hidden layers and action ranges of an actor's card.
 
     Raises:
@@ -58,7 +71,7 @@ def read_actor_card(card: dict[str, Any], path: Path) -> tuple[Layout, list[int]
     if not isinstance(card.get("layout"), str) or card["layout"] not in LAYOUTS:
         raise ArtefactError(f"{path}: unknown layout {card.get('layout')!r}")
     try:
-        hidden = [int(size) for size in card["hidden"]]
+        hidden = tuple(int(size) for size in card["hidden"])
         ranges = action_ranges_from_card(card["action_ranges"])
     except (KeyError, TypeError, ValueError) as error:
         raise ArtefactError(f"{path}: the card's 'hidden' or 'action_ranges' is wrong: {error}") from error
@@ -74,7 +87,8 @@ def actor_from_artefact(artefact: Artefact, path: Path) -> Actor:
     layout, hidden, ranges = read_actor_card(artefact.card, path)
     encoder = load_encoder(encoder_of_card(artefact.card, path))
     sizes = (len(layout.elements) + LATENT_SIZE, *hidden, 5)
-    return Actor(layout, encoder, Perceptron.from_tensors(artefact.tensors, sizes), ranges)
+    network = Perceptron.from_tensors(artefact.tensors, sizes)
+    return Actor(layout, encoder, network, ranges, str(artefact.card.get("algorithm")))
 
 
 def action_ranges_from_card(card: dict[str, object]) -> ActionRanges:

@@ -18,8 +18,12 @@ from rl.inference.arrays import Array32
 from rl.inference.artefacts import Artefact, ArtefactError, load_artefact
 from rl.inference.latent import LATENT_SIZE, encoder_of_card, load_encoder
 from rl.inference.networks import MapEncoder
-from rl.inference.recurrent_network import RecurrentNetwork
-from rl.policies.actor import read_actor_card
+from rl.inference.recurrent_network import RecurrentNetwork, RecurrentSizes
+from rl.policies.actor import bound_action, read_actor_card
+from rl.settings import ON_POLICY_ALGORITHMS, WITH_MEMORY
+
+_HISTORY = {"td3-lstm": ("action",), "td3-lstm-plus": ("action", "reward"), "recurrent-ppo": ()}
+"""What the LSTM of an algorithm sees beside the observation."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +35,7 @@ class FlightMemory:
         dry_mass: [kg] of the lander.
         hidden: shape (memory,), h of the LSTM.
         cell: shape (memory,), c of the LSTM.
-        action: shape (5,), last action; 0 before the first.
+        action: shape (a,), last action; 0 before the first.
         first_mass: [kg] at the first decision; None before it.
         mass: [kg] at the last decision; None before the first.
     """
@@ -58,32 +62,32 @@ class MemoryActor:
     Attributes:
         layout: observation vector that it was trained on.
         encoder: makes the latent of a map.
-        network: LSTM and dense layers; tanh follows.
+        network: LSTM and dense layers.
         ranges: what its actions mean.
+        algorithm: that it was trained by, which says how its actions are bounded.
     """
 
     layout: Layout
     encoder: MapEncoder
     network: RecurrentNetwork
     ranges: ActionRanges = PAPER_ACTIONS
+    algorithm: str = "td3-lstm"
 
     def begin(self, view: ScenarioView) -> FlightMemory:
         """Nothing remembered."""
         zero = np.zeros(self.network.memory, np.float32)
-        return FlightMemory(view.nominal_target, view.lander.dry_mass, zero, zero, np.zeros(5, np.float32))
+        action = np.zeros(self.network.actions, np.float32)
+        return FlightMemory(view.nominal_target, view.lander.dry_mass, zero, zero, action)
 
     def decide(self, observation: Observation, memory: FlightMemory) -> tuple[Decision, FlightMemory]:
         """Decide, and remember."""
         latent = self.encoder.encode(observation.safety_map)
         vector = encode_observation(self.layout, observation, memory.nominal_target, latent)
         mass = observation.state.mass
-        parts = [vector, memory.action]
-        if self.network.previous_reward:
-            parts.append(np.array([memory.reward(mass)], np.float32))
-        inputs, hidden, cell = self.network.evaluate(
-            vector, np.concatenate(parts), (memory.hidden, memory.cell)
-        )
-        action = np.tanh(inputs)
+        beside = {"action": memory.action, "reward": np.array([memory.reward(mass)], np.float32)}
+        history = np.concatenate([vector, *(beside[part] for part in self.network.history)])
+        inputs, hidden, cell = self.network.evaluate(vector, history, (memory.hidden, memory.cell))
+        action = bound_action(inputs, self.algorithm)
         first = mass if memory.first_mass is None else memory.first_mass
         after = FlightMemory(memory.nominal_target, memory.dry_mass, hidden, cell, action, first, mass)
         return decide_action(action, observation, self.ranges), after
@@ -100,9 +104,18 @@ def memory_actor_from_artefact(artefact: Artefact, path: Path) -> MemoryActor:
     memory = artefact.card.get("memory")
     if not isinstance(memory, int):
         raise ArtefactError(f"{path}: the card's 'memory' must be a whole number, got {memory!r}")
-    size, reward = len(layout.elements) + LATENT_SIZE, artefact.card.get("algorithm") == "td3-lstm-plus"
-    network = RecurrentNetwork.from_tensors(artefact.tensors, size, memory, hidden, reward)
-    return MemoryActor(layout, encoder, network, ranges)
+    algorithm = str(artefact.card.get("algorithm"))
+    if algorithm not in WITH_MEMORY:
+        raise ArtefactError(f"{path}: algorithm must be one of {', '.join(WITH_MEMORY)}, got {algorithm!r}")
+    sizes = RecurrentSizes(
+        len(layout.elements) + LATENT_SIZE,
+        memory,
+        hidden,
+        _HISTORY[algorithm],
+        present=algorithm not in ON_POLICY_ALGORITHMS,
+    )
+    network = RecurrentNetwork.from_tensors(artefact.tensors, sizes)
+    return MemoryActor(layout, encoder, network, ranges, algorithm)
 
 
 @cache
