@@ -78,6 +78,9 @@ class AgentSettings:
         learning_rate_decay: steps at which its linear decay begins and ends.
         matmul_precision: "highest" is float32; "medium" lets the processor multiply in bfloat16 where it can.
         shift: the target moves by at most this share of the look's width in one decision.
+        sight: what it sees beside the flight: the last look, or the belief that all looks have left.
+        guidance: what flies to the site: ZEM/ZEV with gains and clock of the agent's own, or convex guidance;
+            then the site alone is the action.
     """
 
     algorithm: AlgorithmName = "td3"
@@ -89,6 +92,8 @@ class AgentSettings:
     learning_rate_decay: tuple[int, int] = (190_000, 250_000)
     matmul_precision: Literal["highest", "high", "medium"] = "medium"
     shift: float = 0.25
+    sight: Literal["look", "belief"] = "look"
+    guidance: Literal["zem-zev", "convex"] = "zem-zev"
 
     @property
     def action_ranges(self) -> ActionRanges:
@@ -209,6 +214,14 @@ OFF_POLICY_RECIPES: dict[str, OffPolicyAgentSettings] = {
     "ddpg": replace(TD3_SETTINGS, algorithm="ddpg"),
     "tqc": replace(SAC_SETTINGS, algorithm="tqc"),
     **RECURRENT_RECIPES,
+    "td3-belief": replace(TD3_SETTINGS, sight="belief"),
+    "td3-convex": replace(
+        TD3_SETTINGS,
+        guidance="convex",
+        learning_rate_decay=(90_000, 140_000),
+        control_prior_weight=0.0,
+        random_steps=10_000,
+    ),
     "td3-paper": replace(
         TD3_SETTINGS,
         layout=PRINTED.name,

@@ -119,9 +119,10 @@ def _named(name: str, kind: type[TrainingOptions], **options: Any) -> Any:
     return Annotated[kind, tyro.conf.subcommand(name, default=kind(**options))]
 
 
+_STEPS = {"td3-convex": 150_000}
 _AGENTS = [
     *(
-        _named(name, TrainAgent, settings=recipe)
+        _named(name, TrainAgent, settings=recipe, steps=_STEPS.get(name, TrainAgent.steps))
         for name, recipe in OFF_POLICY_RECIPES.items()
         if not isinstance(recipe, RecurrentSettings)
     ),

@@ -31,9 +31,14 @@ def make_agent_with_memory(settings: RecurrentSettings, env: Any, seed: int) -> 
     chosen = {field.name: getattr(settings, field.name) for field in fields(SequenceSettings)}
     hyperparameters = Hyperparameters(plus=settings.algorithm == "td3-lstm-plus", **chosen)
     agent = RecurrentTD3(env, hyperparameters, seed, settings.learning_rate_at)
-    controls = (np.arange(agent.sizes.action) < CONTROLS).astype(np.float32)
+    controls = (np.arange(agent.sizes.action) < count_controls(settings)).astype(np.float32)
     agent.action_prior = lambda step: settings.control_prior_at(step) * controls
     return agent
+
+
+def count_controls(settings: AgentSettings) -> int:
+    """So many elements of the action, the first ones, move gains and clock: none under convex guidance."""
+    return CONTROLS if settings.guidance == "zem-zev" else 0
 
 
 def make_algorithm(
@@ -94,6 +99,7 @@ def make_off_policy(settings: OffPolicyAgentSettings, env: Any, seed: int) -> Of
     # decays follow the step and not SB3's share of the total, so that a longer run begins as a shorter one
     algorithm.lr_schedule = lambda _: settings.learning_rate_at(algorithm.num_timesteps)
     if isinstance(algorithm, FastTD3):
+        algorithm.controls = count_controls(settings)
         algorithm.control_prior = lambda: settings.control_prior_at(algorithm.num_timesteps)
         algorithm.target_policy_noise = settings.smoothing_noise
         algorithm.target_noise_clip = 2.5 * settings.smoothing_noise

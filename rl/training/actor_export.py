@@ -73,6 +73,8 @@ def actor_card(settings: AgentSettings) -> dict[str, Any]:
         "encoding_version": ENCODING_VERSION,
         "autoencoder": load_autoencoder(encoder_path(settings.encoder)).digest,
         "action_ranges": asdict(settings.action_ranges),
+        "sight": settings.sight,
+        "guidance": settings.guidance,
     }
 
 

@@ -14,7 +14,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 
 from hda.task.presets import Preset
 from rl.environment.env import LunarHDAEnv
-from rl.environment.vector_env import LunarHDAVectorEnv
+from rl.environment.native.vector_env import LunarHDAVectorEnv
 from rl.inference.artefacts import save_artefact
 from rl.settings import AgentSettings, OnPolicySettings
 from rl.training.actor_export import actor_card, actor_tensors, policy_of

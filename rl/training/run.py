@@ -5,12 +5,13 @@ from __future__ import annotations
 import json
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from hda.task.presets import Preset
 from rl.environment.env import LunarHDAEnv
-from rl.environment.vector_env import LunarHDAVectorEnv
+from rl.environment.native.vector_env import LunarHDAVectorEnv
 from rl.inference.artefacts import library_versions
 from rl.learning.algorithms import make_algorithm
 from rl.learning.precision import matmul_precision
@@ -80,8 +81,8 @@ def make_environment(settings: AgentSettings, preset: Preset) -> LunarHDAEnv | L
     Raises:
         ValueError: a batch does not serve the preset.
     """
-    options = {"layout": settings.layout, "action_ranges": settings.action_ranges}
-    options["encoder"] = settings.encoder
+    options: dict[str, Any] = {"layout": settings.layout, "action_ranges": settings.action_ranges}
+    options |= {"encoder": settings.encoder, "sight": settings.sight, "guidance": settings.guidance}
     if isinstance(settings, OnPolicySettings):
         return LunarHDAVectorEnv(settings.environments, preset=preset, **options)
     return LunarHDAEnv(preset, **options)

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rl.environment.vector_env import LunarHDAMapVectorEnv, LunarHDAVectorEnv
-from rl.environment.vector_snapshot import restore_snapshot, take_snapshot
+from rl.environment.native.vector_env import LunarHDAMapVectorEnv, LunarHDAVectorEnv
+from rl.environment.native.vector_snapshot import restore_snapshot, take_snapshot
 from tests.equality import same
 
 

@@ -13,7 +13,7 @@ from hda.flight.episode import fly
 from hda.task.presets import PRESETS
 from hda.task.scenario import sample_scenario
 from rl.environment.env import LunarHDAEnv
-from rl.environment.vector_env import LunarHDAVectorEnv
+from rl.environment.native.vector_env import LunarHDAVectorEnv
 from rl.inference.artefacts import Artefact, ArtefactError, load_artefact, save_artefact
 from rl.learning.algorithms import make_algorithm
 from rl.policies.actor import AgentPolicy

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rl.environment.vector_env import LandingVectorEnv
+from rl.environment.native.vector_env import LandingVectorEnv
 
 _FLOWN = ("state", "target", "time_to_go", "index", "pointing_limited")
 
