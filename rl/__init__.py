@@ -1,11 +1,12 @@
 """Learning agents: Gymnasium environments, training, shipped weights, and the agents as policies.
 
-Importing this package registers the environments `LunarHDA-v0` and `LunarHDA-Map-v0` with Gymnasium and the
-agents with `hda.registry`. Nothing of torch is imported until something is trained. Where nothing has
-imported it, such as in a worker process, `gymnasium.make("rl:LunarHDA-v0")` does.
+Importing this package registers the environments `LunarHDA-v0`, `LunarHDA-Map-v0` (the raw map),
+`LunarHDA-Site-v0` (the site alone is the action) and `LunarHDA-Belief-v0` (what all looks have left is seen)
+with Gymnasium and the agents with `hda.registry`. Nothing of torch is imported until something is trained.
+Where nothing has imported it, such as in a worker process, `gymnasium.make("rl:LunarHDA-v0")` does.
 """
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import gymnasium
 
@@ -16,14 +17,16 @@ from rl.policies.catalogue import entries
 if TYPE_CHECKING:
     from rl.environment.action import ActionRanges, decide_action
     from rl.environment.dispersions import Dispersions
-    from rl.environment.env import LunarHDAEnv, LunarHDAMapEnv
+    from rl.environment.env import LunarHDAEnv
+    from rl.environment.map_env import LunarHDAMapEnv
     from rl.inference.artefacts import ArtefactError
     from rl.policies.actor import AgentPolicy, AgentSite
 
 _HOMES = {
     "rl.environment.action": ("ActionRanges", "decide_action"),
     "rl.environment.dispersions": ("Dispersions",),
-    "rl.environment.env": ("LunarHDAEnv", "LunarHDAMapEnv"),
+    "rl.environment.env": ("LunarHDAEnv",),
+    "rl.environment.map_env": ("LunarHDAMapEnv",),
     "rl.inference.artefacts": ("ArtefactError",),
     "rl.policies.actor": ("AgentPolicy", "AgentSite"),
 }
@@ -43,13 +46,26 @@ __getattr__, __dir__ = lazy_exports(
     __name__, {name: home for home, names in _HOMES.items() for name in names}
 )
 
-for _name, _class in (("LunarHDA-v0", "LunarHDA{}Env"), ("LunarHDA-Map-v0", "LunarHDAMap{}Env")):
+_SPECIFICATION: dict[str, Any] = {"reward_threshold": 0.25, "max_episode_steps": 20}
+_NATIVE = "rl.environment.native.vector_env"
+gymnasium.register(
+    "LunarHDA-v0",
+    entry_point="rl.environment.env:LunarHDAEnv",
+    vector_entry_point=f"{_NATIVE}:LunarHDAVectorEnv",
+    **_SPECIFICATION,
+)
+gymnasium.register(
+    "LunarHDA-Map-v0",
+    entry_point="rl.environment.map_env:LunarHDAMapEnv",
+    vector_entry_point=f"{_NATIVE}:LunarHDAMapVectorEnv",
+    **_SPECIFICATION,
+)
+for _name, _options in (("Site", {"guidance": "convex"}), ("Belief", {"sight": "belief"})):
     gymnasium.register(
-        _name,
-        entry_point=f"rl.environment.env:{_class.format('')}",
-        vector_entry_point=f"rl.environment.vector_env:{_class.format('Vector')}",
-        reward_threshold=0.25,
-        max_episode_steps=20,
+        f"LunarHDA-{_name}-v0",
+        entry_point="rl.environment.env:LunarHDAEnv",
+        kwargs=_options,
+        **_SPECIFICATION,
     )
 for _entry in entries():
     hda.register_policy(_entry)

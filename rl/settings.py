@@ -9,10 +9,11 @@ from rl.environment.action import ActionRanges
 from rl.environment.encoding import CURVED, PRINTED
 from rl.inference.artefacts import ENCODER
 
-AlgorithmName = Literal["td3", "sac", "ddpg", "tqc", "td3-lstm", "td3-lstm-plus"]
+AlgorithmName = Literal["td3", "sac", "ddpg", "tqc", "td3-lstm", "td3-lstm-plus", "ppo", "recurrent-ppo"]
 
 
-WITH_MEMORY = ("td3-lstm", "td3-lstm-plus")
+WITH_MEMORY = ("td3-lstm", "td3-lstm-plus", "recurrent-ppo")
+ON_POLICY_ALGORITHMS = ("ppo", "recurrent-ppo")
 
 
 @dataclass(frozen=True)
@@ -64,33 +65,35 @@ class SequenceSettings(OffPolicySettings):
 
 
 @dataclass(frozen=True)
-class AgentSettings(OffPolicySettings):
-    """Everything that decides what is learnt, but for the seed and the number of steps.
+class AgentSettings:
+    """What every agent asks for; with what its algorithm adds, all that decides what is learnt but the seed.
 
     Attributes:
         algorithm: which one.
         layout: observation vector (a name in `rl.environment.encoding.LAYOUTS`).
         encoder: shipped encoder of the looks, by name: `autoencoder`, or one that learnt on another preset.
+        hidden: sizes of the hidden layers of every network.
         learning_rate: of Adam, until the decay begins.
         final_learning_rate: where the decay ends.
         learning_rate_decay: steps at which its linear decay begins and ends.
-        control_prior_weight: of the actor's penalty that draws the gains and the clock to their nominal
-            values (td3 and those with memory; see `rl.learning.td3.FastTD3`).
-        control_prior_step: environment step from which it holds: first free, then settled.
         matmul_precision: "highest" is float32; "medium" lets the processor multiply in bfloat16 where it can.
         shift: the target moves by at most this share of the look's width in one decision.
+        sight: what it sees beside the flight: the last look, or the belief that all looks have left.
+        guidance: what flies to the site: ZEM/ZEV with gains and clock of the agent's own, or convex guidance;
+            then the site alone is the action.
     """
 
     algorithm: AlgorithmName = "td3"
     layout: str = CURVED.name
     encoder: str = ENCODER
+    hidden: tuple[int, ...] = (256, 256)
     learning_rate: float = 3e-4
     final_learning_rate: float = 3e-5
     learning_rate_decay: tuple[int, int] = (190_000, 250_000)
-    control_prior_weight: float = 0.2
-    control_prior_step: int = 165_000
     matmul_precision: Literal["highest", "high", "medium"] = "medium"
     shift: float = 0.25
+    sight: Literal["look", "belief"] = "look"
+    guidance: Literal["zem-zev", "convex"] = "zem-zev"
 
     @property
     def action_ranges(self) -> ActionRanges:
@@ -103,21 +106,87 @@ class AgentSettings(OffPolicySettings):
         passed = min(1.0, max(0.0, (step - begin) / max(end - begin, 1)))
         return self.learning_rate + passed * (self.final_learning_rate - self.learning_rate)
 
+
+@dataclass(frozen=True)
+class OffPolicyAgentSettings(OffPolicySettings, AgentSettings):
+    """Settings of an agent that learns from a replay memory.
+
+    Attributes:
+        control_prior_weight: of the actor's penalty that draws the gains and the clock to their nominal
+            values (td3 and those with memory; see `rl.learning.td3.FastTD3`).
+        control_prior_step: environment step from which it holds: first free, then settled.
+    """
+
+    control_prior_weight: float = 0.2
+    control_prior_step: int = 165_000
+
     def control_prior_at(self, step: int) -> float:
         """Weight of the penalty that draws the gains and the clock to their nominal values."""
         return self.control_prior_weight if step >= self.control_prior_step else 0.0
 
 
 @dataclass(frozen=True)
-class RecurrentSettings(SequenceSettings, AgentSettings):
-    """Settings of an agent with memory."""
+class RecurrentSettings(SequenceSettings, OffPolicyAgentSettings):
+    """Settings of an agent with memory that learns from a replay memory."""
 
     algorithm: AlgorithmName = "td3-lstm"
     learning_rate_decay: tuple[int, int] = (85_000, 115_000)
     control_prior_step: int = 80_000
 
 
-TD3_SETTINGS = AgentSettings()
+@dataclass(frozen=True)
+class OnPolicySettings(AgentSettings):
+    """Settings of proximal policy optimisation, which learns from what many environments have just flown.
+
+    Attributes:
+        environments: that fly together, in one batch.
+        horizon: decisions of each environment between two updates.
+        epochs: passes over what was flown.
+        batch_size: decisions of one gradient step.
+        discount: gamma.
+        trace: lambda of the generalised advantages.
+        clip: how far the ratio of likelihoods may leave 1.
+        value_weight: of the critic's loss.
+        greatest_gradient: norm at which gradients are cut.
+        log_deviation: of the actions at the start. Their range is [-1, 1]: with 0 about two in three of the
+            first flights crash, with -1.5 about one in a hundred.
+    """
+
+    algorithm: AlgorithmName = "ppo"
+    learning_rate: float = 1e-3
+    final_learning_rate: float = 0.0
+    learning_rate_decay: tuple[int, int] = (0, 600_000)
+    matmul_precision: Literal["highest", "high", "medium"] = "highest"
+    environments: int = 64
+    horizon: int = 32
+    epochs: int = 10
+    batch_size: int = 512
+    discount: float = 0.99
+    trace: float = 0.95
+    clip: float = 0.2
+    value_weight: float = 0.5
+    greatest_gradient: float = 0.5
+    log_deviation: float = -1.5
+
+
+@dataclass(frozen=True)
+class RecurrentOnPolicySettings(OnPolicySettings):
+    """Settings of proximal policy optimisation with memory.
+
+    Attributes:
+        hidden: sizes of the layers behind each LSTM.
+        memory: hidden size of each LSTM: one of the actor, one of the critic.
+    """
+
+    algorithm: AlgorithmName = "recurrent-ppo"
+    hidden: tuple[int, ...] = (256,)
+    memory: int = 128
+
+
+RECURRENT_PPO_SETTINGS = RecurrentOnPolicySettings()
+
+
+TD3_SETTINGS = OffPolicyAgentSettings()
 
 
 SAC_SETTINGS = replace(
@@ -139,12 +208,20 @@ RECURRENT_RECIPES = {
 }
 
 
-RECIPES: dict[str, AgentSettings] = {
+OFF_POLICY_RECIPES: dict[str, OffPolicyAgentSettings] = {
     "td3": TD3_SETTINGS,
     "sac": SAC_SETTINGS,
     "ddpg": replace(TD3_SETTINGS, algorithm="ddpg"),
     "tqc": replace(SAC_SETTINGS, algorithm="tqc"),
     **RECURRENT_RECIPES,
+    "td3-belief": replace(TD3_SETTINGS, sight="belief"),
+    "td3-convex": replace(
+        TD3_SETTINGS,
+        guidance="convex",
+        learning_rate_decay=(90_000, 140_000),
+        control_prior_weight=0.0,
+        random_steps=10_000,
+    ),
     "td3-paper": replace(
         TD3_SETTINGS,
         layout=PRINTED.name,
@@ -156,8 +233,19 @@ RECIPES: dict[str, AgentSettings] = {
 """`td3-paper` is the vector that the paper prints with the settings that TD3's authors published, since the
 paper gives none; the others start from what measurement found."""
 
+ON_POLICY_RECIPES: dict[str, OnPolicySettings] = {
+    "ppo": OnPolicySettings(),
+    "recurrent-ppo": RECURRENT_PPO_SETTINGS,
+}
+
+RECIPES: dict[str, AgentSettings] = {**OFF_POLICY_RECIPES, **ON_POLICY_RECIPES}
+
+_KINDS: dict[str, type[AgentSettings]] = {
+    name: type(recipe) for name, recipe in RECIPES.items() if recipe.algorithm == name
+}
+
 
 def settings_from_json(values: dict[str, Any]) -> AgentSettings:
-    """Undo `dataclasses.asdict` and JSON on AgentSettings."""
-    kind = RecurrentSettings if values.get("algorithm") in WITH_MEMORY else AgentSettings
+    """Undo `dataclasses.asdict` and JSON on settings; what was added since has its default."""
+    kind = _KINDS.get(values.get("algorithm", "td3"), OffPolicyAgentSettings)
     return kind(**{**values, **{k: tuple(v) for k, v in values.items() if isinstance(v, list)}})

@@ -3,6 +3,7 @@
 python -m rl.train autoencoder                        # the map encoder that every agent needs
 python -m rl.train td3 --seed 0 --out runs/td3-0      # an agent; also sac, ddpg, tqc, td3-paper
 python -m rl.train td3-lstm --seed 0 --out runs/m-0   # an agent with memory; also td3-lstm-plus
+python -m rl.train ppo --seed 0 --out runs/ppo-0      # many environments at a time; also recurrent-ppo
 python -m rl.train td3 --seed 0 --out runs/td3-0 --resume
 python -m rl.train export --name td3 --runs runs/td3-0 runs/td3-1 runs/td3-2
 
@@ -14,31 +15,41 @@ from __future__ import annotations
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, Union
 
 import tyro
 
 from guidance.console import one_line_errors, tolerate_encoding
-from rl.settings import RECIPES, RECURRENT_RECIPES, AgentSettings, RecurrentSettings
+from rl.settings import (
+    OFF_POLICY_RECIPES,
+    ON_POLICY_RECIPES,
+    RECURRENT_PPO_SETTINGS,
+    RECURRENT_RECIPES,
+    AgentSettings,
+    OffPolicyAgentSettings,
+    OnPolicySettings,
+    RecurrentOnPolicySettings,
+    RecurrentSettings,
+)
 from rl.training.export import ExportWeights, run_export
 from rl.training.train_autoencoder import TrainAutoencoder, run_autoencoder_training
 from rl.training_libraries import require_training_libraries
 
 
 @dataclass(frozen=True)
-class TrainAgent:
-    """Train an agent on the training tiles; it is validated on the tuning tiles as it learns.
+class TrainingOptions:
+    """How an agent is trained, whatever it is.
 
     Attributes:
         settings: what is learnt.
         seed: of the first weights, the exploration and the episodes.
         out: folder of the run; runs/NAME-SEED by default.
         preset: setting to fly.
-        steps: environment steps, each followed by one update once the random steps are over.
+        steps: environment steps.
         resume: go on from the newest checkpoint in the folder.
         validate_every: steps between validations.
         validation_episodes: episodes of each validation.
-        checkpoint_every: least steps between checkpoints, which are taken where an episode ends.
+        checkpoint_every: least steps between checkpoints.
     """
 
     settings: tyro.conf.OmitArgPrefixes[AgentSettings]
@@ -53,7 +64,19 @@ class TrainAgent:
 
 
 @dataclass(frozen=True)
-class TrainRecurrentAgent(TrainAgent):
+class TrainAgent(TrainingOptions):
+    """Train an agent on the training tiles; it is validated on the tuning tiles as it learns.
+
+    Attributes:
+        settings: what is learnt.
+        steps: environment steps, each followed by one update once the random steps are over.
+    """
+
+    settings: tyro.conf.OmitArgPrefixes[OffPolicyAgentSettings] = OFF_POLICY_RECIPES["td3"]
+
+
+@dataclass(frozen=True)
+class TrainRecurrentAgent(TrainingOptions):
     """Train an agent with memory (TD3 with LSTM) on the training tiles.
 
     Attributes:
@@ -61,33 +84,63 @@ class TrainRecurrentAgent(TrainAgent):
         steps: environment steps; one update every `update_every` once the random steps are over.
     """
 
-    settings: tyro.conf.OmitArgPrefixes[RecurrentSettings]
+    settings: tyro.conf.OmitArgPrefixes[RecurrentSettings] = RECURRENT_RECIPES["td3-lstm"]
     steps: int = 120_000
 
 
-Command = (
-    Annotated[TrainAutoencoder, tyro.conf.subcommand("autoencoder")]
-    | Annotated[TrainAgent, tyro.conf.subcommand("td3", default=TrainAgent(RECIPES["td3"]))]
-    | Annotated[TrainAgent, tyro.conf.subcommand("sac", default=TrainAgent(RECIPES["sac"]))]
-    | Annotated[TrainAgent, tyro.conf.subcommand("ddpg", default=TrainAgent(RECIPES["ddpg"]))]
-    | Annotated[TrainAgent, tyro.conf.subcommand("tqc", default=TrainAgent(RECIPES["tqc"]))]
-    | Annotated[TrainAgent, tyro.conf.subcommand("td3-paper", default=TrainAgent(RECIPES["td3-paper"]))]
-    | Annotated[
-        TrainRecurrentAgent,
-        tyro.conf.subcommand("td3-lstm", default=TrainRecurrentAgent(RECURRENT_RECIPES["td3-lstm"])),
-    ]
-    | Annotated[
-        TrainRecurrentAgent,
-        tyro.conf.subcommand(
-            "td3-lstm-plus",
-            default=TrainRecurrentAgent(RECURRENT_RECIPES["td3-lstm-plus"], steps=170_000),
-        ),
-    ]
-    | Annotated[ExportWeights, tyro.conf.subcommand("export")]
-)
+@dataclass(frozen=True)
+class TrainOnPolicyAgent(TrainingOptions):
+    """Train an agent by proximal policy optimisation, in many environments at a time.
+
+    Attributes:
+        settings: what is learnt.
+        steps: environment steps of all environments together, rounded up to whole updates.
+    """
+
+    settings: tyro.conf.OmitArgPrefixes[OnPolicySettings] = ON_POLICY_RECIPES["ppo"]
+    steps: int = 600_000
 
 
-def run_agent_training(options: TrainAgent, name: str) -> None:
+@dataclass(frozen=True)
+class TrainRecurrentOnPolicyAgent(TrainingOptions):
+    """Train an agent with memory by proximal policy optimisation, in many environments at a time.
+
+    Attributes:
+        settings: what is learnt.
+        steps: environment steps of all environments together, rounded up to whole updates.
+    """
+
+    settings: tyro.conf.OmitArgPrefixes[RecurrentOnPolicySettings] = RECURRENT_PPO_SETTINGS
+    steps: int = 600_000
+
+
+def _named(name: str, kind: type[TrainingOptions], **options: Any) -> Any:
+    """The command of a recipe."""
+    return Annotated[kind, tyro.conf.subcommand(name, default=kind(**options))]
+
+
+_STEPS = {"td3-convex": 150_000}
+_AGENTS = [
+    *(
+        _named(name, TrainAgent, settings=recipe, steps=_STEPS.get(name, TrainAgent.steps))
+        for name, recipe in OFF_POLICY_RECIPES.items()
+        if not isinstance(recipe, RecurrentSettings)
+    ),
+    _named("td3-lstm", TrainRecurrentAgent),
+    _named("td3-lstm-plus", TrainRecurrentAgent, settings=RECURRENT_RECIPES["td3-lstm-plus"], steps=170_000),
+    _named("ppo", TrainOnPolicyAgent),
+    _named("recurrent-ppo", TrainRecurrentOnPolicyAgent),
+]
+Command = Union[
+    (
+        Annotated[TrainAutoencoder, tyro.conf.subcommand("autoencoder")],
+        *_AGENTS,
+        Annotated[ExportWeights, tyro.conf.subcommand("export")],
+    )
+]
+
+
+def run_agent_training(options: TrainingOptions, name: str) -> None:
     """Run the command of an agent.
 
     Raises:

@@ -1,6 +1,6 @@
 """The Gymnasium environments: what an agent sees, what it may do, and which episodes it flies.
 
-One step is one decision, flown by the functions of `hda.flight`; a native vector flies many at a time. It
+One step is one decision, flown by the functions of `hda.flight`; `native` flies many at a time. It
 imports `rl.inference` for the encoder; agents learn and fly on top of it.
 """
 
@@ -11,8 +11,10 @@ from guidance.exports import lazy_exports
 if TYPE_CHECKING:
     from rl.environment.action import ActionRanges, decide_action
     from rl.environment.dispersions import Dispersions
-    from rl.environment.env import LandingEnv, LunarHDAEnv, LunarHDAMapEnv
-    from rl.environment.vector_env import LandingVectorEnv, LunarHDAMapVectorEnv, LunarHDAVectorEnv
+    from rl.environment.env import LandingEnv, LunarHDAEnv
+    from rl.environment.map_env import LunarHDAMapEnv
+    from rl.environment.sight import BeliefSight, LookSight, make_sight
+    from rl.environment.steering import GainSteering, SiteSteering, make_steering
 
 _HOMES = {
     "rl.environment.action": (
@@ -23,25 +25,25 @@ _HOMES = {
     "rl.environment.env": (
         "LandingEnv",
         "LunarHDAEnv",
-        "LunarHDAMapEnv",
     ),
-    "rl.environment.vector_env": (
-        "LandingVectorEnv",
-        "LunarHDAMapVectorEnv",
-        "LunarHDAVectorEnv",
-    ),
+    "rl.environment.map_env": ("LunarHDAMapEnv",),
+    "rl.environment.sight": ("BeliefSight", "LookSight", "make_sight"),
+    "rl.environment.steering": ("GainSteering", "SiteSteering", "make_steering"),
 }
 
 __all__ = [
     "ActionRanges",
+    "BeliefSight",
     "Dispersions",
+    "GainSteering",
     "LandingEnv",
-    "LandingVectorEnv",
+    "LookSight",
     "LunarHDAEnv",
     "LunarHDAMapEnv",
-    "LunarHDAMapVectorEnv",
-    "LunarHDAVectorEnv",
+    "SiteSteering",
     "decide_action",
+    "make_sight",
+    "make_steering",
 ]
 
 __getattr__, __dir__ = lazy_exports(

@@ -80,15 +80,8 @@ def scale_actions(
     Raises:
         ValueError: the actions have another shape or are not finite.
     """
-    values = np.asarray(actions, dtype=np.float64)
-    expected = (*np.shape(widths), 5)
-    if values.shape != expected:
-        raise ValueError(f"action must have shape {expected}, got {values.shape}")
-    if not np.isfinite(values).all():
-        first = tuple(np.argwhere(~np.isfinite(values).all(axis=-1))[0].tolist())
-        where = f" in row {', '.join(map(str, first))}" if first else ""
-        raise ValueError(f"action must be finite, got {values[first].tolist()}{where}")
-    position_gain, velocity_gain, step, shift_x, shift_y = np.moveaxis(np.clip(values, -1.0, 1.0), -1, 0)
+    values = clip_actions(actions, (*np.shape(widths), 5))
+    position_gain, velocity_gain, step, shift_x, shift_y = np.moveaxis(values, -1, 0)
     greatest = ranges.shift * widths
     return ScaledActions(
         _between(ranges.position_gain, position_gain),
@@ -97,6 +90,22 @@ def scale_actions(
         shift_x * greatest,
         shift_y * greatest,
     )
+
+
+def clip_actions(actions: NDArray[np.floating], shape: tuple[int, ...]) -> Array:
+    """Actions within [-1, 1], each one row.
+
+    Raises:
+        ValueError: they have another shape or are not finite.
+    """
+    values = np.asarray(actions, dtype=np.float64)
+    if values.shape != shape:
+        raise ValueError(f"action must have shape {shape}, got {values.shape}")
+    if not np.isfinite(values).all():
+        first = tuple(np.argwhere(~np.isfinite(values).all(axis=-1))[0].tolist())
+        where = f" in row {', '.join(map(str, first))}" if first else ""
+        raise ValueError(f"action must be finite, got {values[first].tolist()}{where}")
+    return np.clip(values, -1.0, 1.0)
 
 
 def decide_action(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, fields, replace
 
 from guidance.validation import finite_number
@@ -89,3 +90,13 @@ def _scaled(bounds: Range, factor: float) -> Range:
     middle = 0.5 * (bounds.low + bounds.high)
     half = 0.5 * factor * (bounds.high - bounds.low)
     return Range(middle - half, middle + half)
+
+
+DISPERSION_NAMES = tuple(entry.name for entry in fields(Dispersions))
+
+
+def refuse_unknown_options(options: Collection[str], known: tuple[str, ...]) -> None:
+    """Raise ValueError where an option of `reset` is not known."""
+    unknown = sorted(set(options) - set(known))
+    if unknown:
+        raise ValueError(f"options must be among {', '.join(known)}, got {', '.join(unknown)}")

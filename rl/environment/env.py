@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Collection
-from dataclasses import fields
+from functools import cached_property
 from typing import Any, Generic, TypeVar
 
 import gymnasium
@@ -12,31 +11,23 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from guidance.arrays import Array
 from hda.flight.episode import Flight, Step, advance, begin_flight, observe
 from hda.flight.outcome import Outcome
-from hda.task.observation import Observation
+from hda.task.observation import Observation, ScenarioView
 from hda.task.presets import Preset, find_preset
 from hda.task.scenario import Scenario
-from rl.environment.action import PAPER_ACTIONS, ActionRanges, decide_action
-from rl.environment.dispersions import Dispersions
-from rl.environment.encoding import (
-    CURVED,
-    LATENT_BOUND,
-    LAYOUTS,
-    Layout,
-    encode_flight,
-    encode_map,
-    encode_observation,
-)
+from rl.environment.action import PAPER_ACTIONS, ActionRanges
+from rl.environment.dispersions import DISPERSION_NAMES, Dispersions, refuse_unknown_options
+from rl.environment.encoding import CURVED, LAYOUTS, Layout
 from rl.environment.episode_info import describe_episode
 from rl.environment.episode_source import EpisodeSource
+from rl.environment.sight import Sight, make_sight
+from rl.environment.steering import GainSteering, Steering, make_steering
 from rl.inference.arrays import Array32
 from rl.inference.artefacts import ENCODER
-from rl.inference.latent import LATENT_SIZE, encoder_path, load_encoder
+from rl.inference.latent import encoder_path, load_encoder
 
 ObsType = TypeVar("ObsType")
-DISPERSION_NAMES = tuple(entry.name for entry in fields(Dispersions))
 
 
 class LandingEnv(gymnasium.Env[ObsType, Array32], Generic[ObsType]):
@@ -78,9 +69,9 @@ class LandingEnv(gymnasium.Env[ObsType, Array32], Generic[ObsType]):
 
     The objects behind them are `env.unwrapped.outcome` (None in flight), `.steps` and `.scenario`.
 
-    **Many at a time**: `gymnasium.make_vec` (`rl.environment.vector_env.LandingVectorEnv`). `gymnasium.make`
-    truncates after 20 steps, as the rules of every preset do; for rules that allow more pass it
-    `max_episode_steps`.
+    **Many at a time**: `gymnasium.make_vec` (`rl.environment.native.vector_env.LandingVectorEnv`).
+    `gymnasium.make` truncates after 20 steps, as the rules of every preset do; for rules that allow more pass
+    it `max_episode_steps`.
 
     **Worker processes** that have not imported `rl` know the environments as `"rl:LunarHDA-v0"` and
     `"rl:LunarHDA-Map-v0"`: Gymnasium imports what stands before the colon.
@@ -121,7 +112,7 @@ class LandingEnv(gymnasium.Env[ObsType, Array32], Generic[ObsType]):
         self.layout: Layout = LAYOUTS[layout]
         self.action_ranges = action_ranges
         self.render_mode = render_mode
-        self.action_space = spaces.Box(-1.0, 1.0, (5,), np.float32)
+        self.action_space = spaces.Box(-1.0, 1.0, (self.steering.size,), np.float32)
         self.observation_space = self.make_observation_space(setting)
         self.study_seed: int | None = None
         self.next_episode = 0
@@ -129,14 +120,24 @@ class LandingEnv(gymnasium.Env[ObsType, Array32], Generic[ObsType]):
         self.steps: list[Step] = []
         self._flight: Flight | None = None
         self._observation: Observation | None = None
+        self._steered: Any = None
+
+    @cached_property
+    def steering(self) -> Steering:
+        """What an action becomes: ZEM/ZEV with the agent's gains."""
+        return GainSteering(self.action_ranges)
 
     @abstractmethod
     def make_observation_space(self, preset: Preset) -> spaces.Space[ObsType]:
         """The space of what `encode` gives on a preset."""
 
     @abstractmethod
-    def encode(self, observation: Observation, nominal_target: Array) -> ObsType:
-        """Turn an observation into a new element of the observation space."""
+    def encode(self, observation: Observation) -> ObsType:
+        """Turn an observation into a new element of the observation space; once for each look."""
+
+    def begin(self, view: ScenarioView) -> None:
+        """Remember nothing of the episodes before."""
+        self._steered = self.steering.begin(view)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -163,6 +164,7 @@ class LandingEnv(gymnasium.Env[ObsType, Array32], Generic[ObsType]):
         super().reset(seed=seed)
         self.study_seed, self.next_episode = study, episode
         self.scenario, self.steps = scenario, []
+        self.begin(scenario.view)
         return self._look(begin_flight(scenario))
 
     def step(self, action: Array32) -> tuple[ObsType, float, bool, bool, dict[str, Any]]:
@@ -175,7 +177,8 @@ class LandingEnv(gymnasium.Env[ObsType, Array32], Generic[ObsType]):
         scenario, flight, look = self.scenario, self._flight, self._observation
         if scenario is None or flight is None or look is None or self.outcome:
             raise gymnasium.error.ResetNeeded("the episode is over or has not begun: call reset()")
-        step = advance(scenario, flight, decide_action(action, look, self.action_ranges))
+        decision, self._steered = self.steering.decide(action, look, self._steered)
+        step = advance(scenario, flight, decision)
         self.steps.append(step)
         terminated = step.outcome is not None and not step.truncated
         seen, info = self._look(step.flight)
@@ -209,15 +212,8 @@ class LandingEnv(gymnasium.Env[ObsType, Array32], Generic[ObsType]):
         assert self.scenario is not None
         self._flight = flight
         self._observation = observe(self.scenario, flight)
-        seen = self.encode(self._observation, self.scenario.nominal_target)
+        seen = self.encode(self._observation)
         return seen, describe_episode(self.scenario, flight, self.steps)
-
-
-def refuse_unknown_options(options: Collection[str], known: tuple[str, ...]) -> None:
-    """Raise ValueError where an option of `reset` is not known."""
-    unknown = sorted(set(options) - set(known))
-    if unknown:
-        raise ValueError(f"options must be among {', '.join(known)}, got {', '.join(unknown)}")
 
 
 class LunarHDAEnv(LandingEnv[Array32]):
@@ -242,53 +238,53 @@ class LunarHDAEnv(LandingEnv[Array32]):
     prints them: position, velocity, mass, width twice, target. Rewards, actions and options: `LandingEnv`.
     """
 
-    def __init__(self, *arguments: Any, encoder: str = ENCODER, **options: Any) -> None:
+    def __init__(
+        self,
+        *arguments: Any,
+        encoder: str = ENCODER,
+        sight: str = "look",
+        guidance: str = "zem-zev",
+        **options: Any,
+    ) -> None:
         """Make the environment.
 
         Args:
             arguments: as of `LandingEnv`.
             encoder: shipped encoder of the looks, by name.
+            sight: "look", or "belief": what all looks so far have left, in 92 numbers
+                (`rl.environment.sight.BeliefSight`), which is `LunarHDA-Belief-v0`.
+            guidance: "zem-zev", or "convex": the action is the site alone, elements 3 and 4, and convex
+                guidance flies to it (`rl.environment.steering.SiteSteering`), which is `LunarHDA-Site-v0`.
             options: as of `LandingEnv`.
 
         Raises:
-            ValueError: there is no such encoder; else as `LandingEnv`.
+            ValueError: there is no such encoder, sight or guidance; else as `LandingEnv`.
         """
         self.encoder = load_encoder(encoder_path(encoder))
+        self._guidance, self._sight_name, self._seen = guidance, sight, None
         super().__init__(*arguments, **options)
+
+    @cached_property
+    def steering(self) -> Steering:
+        """What an action becomes."""
+        return make_steering(self._guidance, self.action_ranges)
+
+    @cached_property
+    def sight(self) -> Sight:
+        """What is seen."""
+        return make_sight(self._sight_name, self.layout, self.encoder)
+
+    def begin(self, view: ScenarioView) -> None:
+        """Remember nothing of the episodes before."""
+        super().begin(view)
+        self._seen = self.sight.begin(view)
 
     def make_observation_space(self, preset: Preset) -> spaces.Space[Array32]:
         """A box."""
-        bound = np.full(LATENT_SIZE, LATENT_BOUND, np.float32)
-        low, high = np.concatenate([self.layout.low, -bound]), np.concatenate([self.layout.high, bound])
+        low, high = self.sight.bounds
         return spaces.Box(low, high, dtype=np.float32)
 
-    def encode(self, observation: Observation, nominal_target: Array) -> Array32:
-        """The 44 numbers."""
-        latent = self.encoder.encode(observation.safety_map)
-        return encode_observation(self.layout, observation, nominal_target, latent)
-
-
-class LunarHDAMapEnv(LandingEnv[dict[str, Any]]):
-    """`LunarHDA-Map-v0`: the flight and the raw map, for networks that read the map themselves.
-
-    - `flight`: float32, shape (12,), elements 0-11 of `LunarHDA-v0`, by the same `layout`;
-    - `map`: uint8, shape (1, 64, 64), the observed safety times 255 (far finer than the sensor's noise);
-      channel first, row i grows north, column j east, centred on the current target.
-
-    Rewards, actions and options: `LandingEnv`.
-    """
-
-    def make_observation_space(self, preset: Preset) -> spaces.Space[dict[str, Any]]:
-        """The flight and the map, each a box."""
-        pixels = preset.lidar.pixels
-        return spaces.Dict(
-            flight=spaces.Box(self.layout.low, self.layout.high, dtype=np.float32),
-            map=spaces.Box(0, 255, (1, pixels, pixels), np.uint8),
-        )
-
-    def encode(self, observation: Observation, nominal_target: Array) -> dict[str, Any]:
-        """The flight and the map."""
-        return {
-            "flight": encode_flight(self.layout, observation, nominal_target),
-            "map": encode_map(observation.safety_map)[None],
-        }
+    def encode(self, observation: Observation) -> Array32:
+        """The numbers."""
+        vector, self._seen = self.sight.see(observation, self._seen)
+        return vector

@@ -180,6 +180,11 @@ class Perceptron:
             layers.append((weight, bias))
         return cls(tuple(layers))
 
+    @property
+    def outputs(self) -> int:
+        """Numbers that come out."""
+        return self.layers[-1][1].size
+
     def evaluate(self, inputs: Array32) -> Array32:
         """Outputs of one row, without a final nonlinearity."""
         values = np.ascontiguousarray(inputs, dtype=np.float32)

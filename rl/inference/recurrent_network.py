@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,40 +41,54 @@ def _remember(
     return after, kept
 
 
+@dataclass(frozen=True)
+class RecurrentSizes:
+    """Shapes that the weights of an actor with memory must have.
+
+    Attributes:
+        observation: numbers in an observation.
+        memory: size of the memory.
+        hidden: sizes of the hidden layers of the head.
+        history: what the LSTM sees beside the observation: "action", the last one; "reward", the last one.
+        present: the head also sees the present observation, through a dense layer; else the memory alone.
+        actions: numbers in an action.
+    """
+
+    observation: int
+    memory: int
+    hidden: tuple[int, ...]
+    history: tuple[str, ...] = ("action",)
+    present: bool = True
+    actions: int = 5
+
+
 @dataclass(frozen=True, eq=False)
 class RecurrentNetwork:
-    """An actor with memory: an LSTM of the past beside the present observation.
+    """An actor with memory: an LSTM of the past, and dense layers on what it holds.
 
     Attributes:
         lstm: (W (history, 4 memory), U (memory, 4 memory), bias (4 memory,)).
-        present: dense layer on the observation; a rectifier follows.
+        present: dense layer on the observation; a rectifier follows. None: the head sees the memory alone.
         head: dense layers on (past, present).
-        previous_reward: the history holds the last reward after the last action.
+        history: what the LSTM sees beside the observation, as in `RecurrentSizes`.
     """
 
     lstm: tuple[Array32, Array32, Array32]
-    present: Perceptron
+    present: Perceptron | None
     head: Perceptron
-    previous_reward: bool
+    history: tuple[str, ...]
 
     @classmethod
-    def from_tensors(
-        cls, tensors: Tensors, observation: int, memory: int, hidden: Sequence[int], previous_reward: bool
-    ) -> RecurrentNetwork:
+    def from_tensors(cls, tensors: Tensors, sizes: RecurrentSizes) -> RecurrentNetwork:
         """Take the tensors as stored.
-
-        Args:
-            tensors: the arrays.
-            observation: expected numbers in an observation.
-            memory: expected size of the memory.
-            hidden: expected sizes of the hidden layers of the head; five actions follow.
-            previous_reward: whether the history holds it.
 
         Raises:
             ArtefactError: a tensor is missing or of another type or shape.
         """
+        observation, memory = sizes.observation, sizes.memory
+        beside = {"action": sizes.actions, "reward": 1}
         shapes = {
-            "lstm.input": (observation + 5 + int(previous_reward), 4 * memory),
+            "lstm.input": (observation + sum(beside[part] for part in sizes.history), 4 * memory),
             "lstm.recurrent": (memory, 4 * memory),
             "lstm.bias": (4 * memory,),
         }
@@ -83,21 +96,37 @@ class RecurrentNetwork:
             if name not in tensors or tensors[name].dtype != np.float32 or tensors[name].shape != shape:
                 raise ArtefactError(f"the weights need a float32 tensor {name!r} of shape {shape}")
         lstm = tuple(np.ascontiguousarray(tensors[name]) for name in shapes)
-        parts = {f"layer.0.{kind}": tensors.get(f"present.{kind}") for kind in ("weight", "bias")}
-        known = {name: tensor for name, tensor in parts.items() if tensor is not None}
-        present = Perceptron.from_tensors(known, (observation, memory))
-        head = Perceptron.from_tensors(tensors, (2 * memory, *hidden, 5))
-        return cls(lstm, present, head, previous_reward)  # type: ignore[arg-type]
+        present = None
+        if sizes.present:
+            parts = {f"layer.0.{kind}": tensors.get(f"present.{kind}") for kind in ("weight", "bias")}
+            known = {name: tensor for name, tensor in parts.items() if tensor is not None}
+            present = Perceptron.from_tensors(known, (observation, memory))
+        inputs = memory * (2 if sizes.present else 1)
+        head = Perceptron.from_tensors(tensors, (inputs, *sizes.hidden, sizes.actions))
+        return cls(lstm, present, head, sizes.history)  # type: ignore[arg-type]
 
     @property
     def memory(self) -> int:
         """Size of the memory."""
         return self.lstm[1].shape[0]
 
+    @property
+    def actions(self) -> int:
+        """Numbers in an action."""
+        return self.head.outputs
+
     def evaluate(
         self, observation: Array32, history: Array32, past: tuple[Array32, Array32]
     ) -> tuple[Array32, ...]:
-        """Action before its tanh (5,), and the new memory (hidden, cell), each (memory,)."""
+        """Action before it is bounded (a,), and the new memory (hidden, cell), each (memory,).
+
+        Args:
+            observation: shape (o,).
+            history: what the LSTM sees: the observation, and what `history` names.
+            past: the memory so far.
+        """
         hidden, cell = _remember(history, *past, self.lstm)
+        if self.present is None:
+            return self.head.evaluate(hidden), hidden, cell
         present = np.maximum(self.present.evaluate(observation), np.float32(0.0))
         return self.head.evaluate(np.concatenate([hidden, present])), hidden, cell

@@ -8,10 +8,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rl.environment.action import CONTROLS
-from rl.settings import AgentSettings, RecurrentSettings, SequenceSettings
+from rl.settings import (
+    AgentSettings,
+    OffPolicyAgentSettings,
+    OnPolicySettings,
+    RecurrentSettings,
+    SequenceSettings,
+)
 
 if TYPE_CHECKING:
     from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
+    from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 
     from rl.learning.recurrent.td3_lstm import RecurrentTD3
 
@@ -24,28 +31,44 @@ def make_agent_with_memory(settings: RecurrentSettings, env: Any, seed: int) -> 
     chosen = {field.name: getattr(settings, field.name) for field in fields(SequenceSettings)}
     hyperparameters = Hyperparameters(plus=settings.algorithm == "td3-lstm-plus", **chosen)
     agent = RecurrentTD3(env, hyperparameters, seed, settings.learning_rate_at)
-    controls = (np.arange(agent.sizes.action) < CONTROLS).astype(np.float32)
+    controls = (np.arange(agent.sizes.action) < count_controls(settings)).astype(np.float32)
     agent.action_prior = lambda step: settings.control_prior_at(step) * controls
     return agent
 
 
-def make_algorithm(settings: AgentSettings, env: Any, seed: int) -> OffPolicyAlgorithm | RecurrentTD3:
+def count_controls(settings: AgentSettings) -> int:
+    """So many elements of the action, the first ones, move gains and clock: none under convex guidance."""
+    return CONTROLS if settings.guidance == "zem-zev" else 0
+
+
+def make_algorithm(
+    settings: AgentSettings, env: Any, seed: int
+) -> OffPolicyAlgorithm | OnPolicyAlgorithm | RecurrentTD3:
     """Make an untrained algorithm.
 
     Args:
         settings: what is learnt.
-        env: Gymnasium environment.
+        env: Gymnasium environment; for what learns from many at a time Stable-Baselines3's `VecEnv`.
         seed: of the first weights, the exploration and the episodes.
 
     Raises:
         ValueError: unknown algorithm, or spaces that are not one-dimensional boxes, finite for actions.
-        ImportError: `tqc` without sb3-contrib.
+        ImportError: `tqc` or `recurrent-ppo` without sb3-contrib.
     """
     from rl.learning.box_spaces import check_environment
+    from rl.learning.ppo import make_on_policy
 
+    if isinstance(settings, OnPolicySettings):
+        return make_on_policy(settings, env, seed)
     check_environment(env)
     if isinstance(settings, RecurrentSettings):
         return make_agent_with_memory(settings, env, seed)
+    assert isinstance(settings, OffPolicyAgentSettings)
+    return make_off_policy(settings, env, seed)
+
+
+def make_off_policy(settings: OffPolicyAgentSettings, env: Any, seed: int) -> OffPolicyAlgorithm:
+    """Make an untrained agent without memory that learns from a replay memory; as `make_algorithm`."""
     from stable_baselines3 import DDPG, SAC
     from stable_baselines3.common.noise import NormalActionNoise
 
@@ -76,6 +99,7 @@ def make_algorithm(settings: AgentSettings, env: Any, seed: int) -> OffPolicyAlg
     # decays follow the step and not SB3's share of the total, so that a longer run begins as a shorter one
     algorithm.lr_schedule = lambda _: settings.learning_rate_at(algorithm.num_timesteps)
     if isinstance(algorithm, FastTD3):
+        algorithm.controls = count_controls(settings)
         algorithm.control_prior = lambda: settings.control_prior_at(algorithm.num_timesteps)
         algorithm.target_policy_noise = settings.smoothing_noise
         algorithm.target_noise_clip = 2.5 * settings.smoothing_noise

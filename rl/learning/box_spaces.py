@@ -22,11 +22,21 @@ def check_environment(env: Any) -> None:
         ValueError: it is no single Gymnasium environment; an observation is not a one-dimensional Box; or the
             action space is refused by `check_action_space`.
     """
+    if hasattr(env, "num_envs"):
+        raise ValueError(f"env must be one environment, got a vector of {env.num_envs}")
+    check_boxes(env)
+
+
+def check_boxes(env: Any) -> None:
+    """Refuse spaces that dense layers cannot take, of one environment or of those that a vector holds.
+
+    Raises:
+        ValueError: there are none; an observation is not a one-dimensional Box; or the action space is
+            refused by `check_action_space`.
+    """
     for name in ("observation_space", "action_space"):
         if not isinstance(getattr(env, name, None), spaces.Space):
             raise ValueError(f"env must be a Gymnasium environment, got {env!r} without {name}")
-    if hasattr(env, "num_envs"):
-        raise ValueError(f"env must be one environment, got a vector of {env.num_envs}")
     _check_box("observation_space", env.observation_space, _FLATTEN)
     check_action_space(env.action_space)
 

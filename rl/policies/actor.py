@@ -13,56 +13,98 @@ from guidance.arrays import Array
 from hda.policy import Decision
 from hda.task.observation import Observation, ScenarioView
 from hda.task.rules import Range
-from rl.environment.action import PAPER_ACTIONS, ActionRanges, decide_action
-from rl.environment.encoding import ENCODING_VERSION, LAYOUTS, Layout, encode_observation
+from rl.environment.action import ActionRanges
+from rl.environment.encoding import ENCODING_VERSION, LAYOUTS
+from rl.environment.sight import Sight, make_sight
+from rl.environment.steering import Steering, make_steering
 from rl.inference.arrays import Array32
 from rl.inference.artefacts import WEIGHTS_FOLDER, Artefact, ArtefactError, load_artefact, require
-from rl.inference.latent import LATENT_SIZE, encoder_of_card, load_encoder
-from rl.inference.networks import MapEncoder, Perceptron
+from rl.inference.latent import encoder_of_card, load_encoder
+from rl.inference.networks import Perceptron
+from rl.settings import ON_POLICY_ALGORITHMS
+
+
+def bound_action(inputs: Array32, algorithm: str) -> Array32:
+    """The action in [-1, 1] that an actor's last layer means: of proximal policies the mean, else its tanh.
+
+    Args:
+        inputs: shape (a,), of the last layer.
+        algorithm: that it was trained by.
+    """
+    return np.clip(inputs, -1.0, 1.0) if algorithm in ON_POLICY_ALGORITHMS else np.tanh(inputs)
+
+
+@dataclass(frozen=True)
+class ActorDesign:
+    """What an actor's card says of it, but its weights.
+
+    Attributes:
+        sight: what it sees.
+        steering: what its actions become.
+        hidden: sizes of its hidden layers.
+        algorithm: that it was trained by, which says how its actions are bounded.
+    """
+
+    sight: Sight
+    steering: Steering
+    hidden: tuple[int, ...]
+    algorithm: str
+
+    @classmethod
+    def from_card(cls, card: dict[str, Any], path: Path) -> ActorDesign:
+        """Read it; `path` is named in messages.
+
+        Raises:
+            ArtefactError: it was made for another encoding or another autoencoder, or a field is wrong.
+        """
+        require(card, "encoding_version", ENCODING_VERSION, path)
+        if not isinstance(card.get("layout"), str) or card["layout"] not in LAYOUTS:
+            raise ArtefactError(f"{path}: unknown layout {card.get('layout')!r}")
+        encoder = load_encoder(encoder_of_card(card, path))
+        try:
+            hidden = tuple(int(size) for size in card["hidden"])
+            ranges = action_ranges_from_card(card["action_ranges"])
+            sight = make_sight(card.get("sight", "look"), LAYOUTS[card["layout"]], encoder)
+            steering = make_steering(card.get("guidance", "zem-zev"), ranges)
+        except (KeyError, TypeError, ValueError) as error:
+            fields = "'hidden', 'action_ranges', 'sight' or 'guidance'"
+            raise ArtefactError(f"{path}: the card's {fields} is wrong: {error}") from error
+        return cls(sight, steering, hidden, str(card.get("algorithm")))
+
+    @property
+    def seen(self) -> int:
+        """Numbers in what it sees."""
+        return self.sight.bounds[0].size
+
+    def begin(self, view: ScenarioView) -> tuple[Any, Any]:
+        """Memory of sight and steering before the first look."""
+        return self.sight.begin(view), self.steering.begin(view)
 
 
 @dataclass(frozen=True, eq=False)
 class Actor:
-    """Observation -> action: the deterministic part of an agent without memory.
+    """Observation -> decision: the deterministic part of an agent whose network remembers nothing.
+
+    What sight and steering remember, such as a belief or a plan, goes in and comes out.
 
     Attributes:
-        layout: observation vector that it was trained on.
-        encoder: makes the latent of a map.
-        network: its dense layers; tanh follows.
-        ranges: what its actions mean.
+        design: what it sees, and what its actions become.
+        network: its dense layers.
     """
 
-    layout: Layout
-    encoder: MapEncoder
+    design: ActorDesign
     network: Perceptron
-    ranges: ActionRanges = PAPER_ACTIONS
 
-    def act(self, observation: Observation, nominal_target: Array) -> Array32:
-        """Action of shape (5,) in [-1, 1]."""
-        latent = self.encoder.encode(observation.safety_map)
-        vector = encode_observation(self.layout, observation, nominal_target, latent)
-        return np.tanh(self.network.evaluate(vector))
+    def begin(self, view: ScenarioView) -> tuple[Any, Any]:
+        """Memory before the first look."""
+        return self.design.begin(view)
 
-    def decide(self, observation: Observation, nominal_target: Array) -> Decision:
-        """Decision of the action."""
-        return decide_action(self.act(observation, nominal_target), observation, self.ranges)
-
-
-def read_actor_card(card: dict[str, Any], path: Path) -> tuple[Layout, list[int], ActionRanges]:
-    """Layout, sizes of the hidden layers and action ranges of an actor's card.
-
-    Raises:
-        ArtefactError: it was made for another encoding, or a field is wrong.
-    """
-    require(card, "encoding_version", ENCODING_VERSION, path)
-    if not isinstance(card.get("layout"), str) or card["layout"] not in LAYOUTS:
-        raise ArtefactError(f"{path}: unknown layout {card.get('layout')!r}")
-    try:
-        hidden = [int(size) for size in card["hidden"]]
-        ranges = action_ranges_from_card(card["action_ranges"])
-    except (KeyError, TypeError, ValueError) as error:
-        raise ArtefactError(f"{path}: the card's 'hidden' or 'action_ranges' is wrong: {error}") from error
-    return LAYOUTS[card["layout"]], hidden, ranges
+    def decide(self, observation: Observation, memory: tuple[Any, Any]) -> tuple[Decision, tuple[Any, Any]]:
+        """Decision of the action, and the memory for the next."""
+        vector, seen = self.design.sight.see(observation, memory[0])
+        action = bound_action(self.network.evaluate(vector), self.design.algorithm)
+        decision, steered = self.design.steering.decide(action, observation, memory[1])
+        return decision, (seen, steered)
 
 
 def actor_from_artefact(artefact: Artefact, path: Path) -> Actor:
@@ -71,10 +113,9 @@ def actor_from_artefact(artefact: Artefact, path: Path) -> Actor:
     Raises:
         ArtefactError: they were made for another encoding, another autoencoder, or have other shapes.
     """
-    layout, hidden, ranges = read_actor_card(artefact.card, path)
-    encoder = load_encoder(encoder_of_card(artefact.card, path))
-    sizes = (len(layout.elements) + LATENT_SIZE, *hidden, 5)
-    return Actor(layout, encoder, Perceptron.from_tensors(artefact.tensors, sizes), ranges)
+    design = ActorDesign.from_card(artefact.card, path)
+    sizes = (design.seen, *design.hidden, design.steering.size)
+    return Actor(design, Perceptron.from_tensors(artefact.tensors, sizes))
 
 
 def action_ranges_from_card(card: dict[str, object]) -> ActionRanges:
@@ -95,7 +136,7 @@ def load_actor(path: Path) -> Actor:
 
 @dataclass(frozen=True)
 class AgentPolicy:
-    """The agent as the paper flies it: it moves the target, the gains and the time to go.
+    """An agent without memory in its network, as it was trained to fly.
 
     Attributes:
         name: name in tables.
@@ -105,18 +146,17 @@ class AgentPolicy:
     name: str
     weights: Path
 
-    def begin(self, scenario_view: ScenarioView, rng: np.random.Generator) -> Array:
-        """Read the weights, remember the first target.
+    def begin(self, scenario_view: ScenarioView, rng: np.random.Generator) -> tuple[Any, Any]:
+        """Read the weights; memory of sight and steering.
 
         Raises:
             ArtefactError: the weights are missing, damaged or foreign.
         """
-        load_actor(self.weights)
-        return scenario_view.nominal_target
+        return load_actor(self.weights).begin(scenario_view)
 
-    def decide(self, observation: Observation, memory: Array) -> tuple[Decision, Array]:
-        """Decide from this observation alone."""
-        return load_actor(self.weights).decide(observation, memory), memory
+    def decide(self, observation: Observation, memory: tuple[Any, Any]) -> tuple[Decision, tuple[Any, Any]]:
+        """Decide from this observation, and what sight and steering remember."""
+        return load_actor(self.weights).decide(observation, memory)
 
 
 @dataclass(frozen=True)
@@ -131,13 +171,13 @@ class ActorPolicy:
     name: str
     actor: Actor = field(repr=False)
 
-    def begin(self, scenario_view: ScenarioView, rng: np.random.Generator) -> Array:
-        """Remember the first target."""
-        return scenario_view.nominal_target
+    def begin(self, scenario_view: ScenarioView, rng: np.random.Generator) -> tuple[Any, Any]:
+        """Memory of sight and steering."""
+        return self.actor.begin(scenario_view)
 
-    def decide(self, observation: Observation, memory: Array) -> tuple[Decision, Array]:
-        """Decide from this observation alone."""
-        return self.actor.decide(observation, memory), memory
+    def decide(self, observation: Observation, memory: tuple[Any, Any]) -> tuple[Decision, tuple[Any, Any]]:
+        """Decide from this observation, and what sight and steering remember."""
+        return self.actor.decide(observation, memory)
 
 
 @dataclass(frozen=True)
@@ -152,18 +192,18 @@ class AgentSite:
 
     weights: Path
 
-    def begin(self, view: ScenarioView) -> Array:
-        """Read the weights, remember the first target.
+    def begin(self, view: ScenarioView) -> tuple[Any, Any]:
+        """Read the weights; memory of sight and steering.
 
         Raises:
             ArtefactError: the weights are missing, damaged or foreign.
         """
-        load_actor(self.weights)
-        return view.nominal_target
+        return load_actor(self.weights).begin(view)
 
-    def select(self, observation: Observation, memory: Array) -> tuple[Array, Array]:
+    def select(self, observation: Observation, memory: tuple[Any, Any]) -> tuple[Array, tuple[Any, Any]]:
         """Site of the agent's decision."""
-        return load_actor(self.weights).decide(observation, memory).site, memory
+        decision, memory = load_actor(self.weights).decide(observation, memory)
+        return decision.site, memory
 
 
 def weights_name(agent: str, preset: str) -> str:

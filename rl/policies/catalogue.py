@@ -17,6 +17,10 @@ _AGENTS = {
     "sac": "the same agent trained with soft actor-critic",
     "td3-lstm": "the paper's agent with memory: TD3 with LSTM, Algorithm 3",
     "td3-lstm-plus": "the same with one masked memory, the last reward in the history, an encoder per role",
+    "td3-convex": "moves the target alone; convex guidance flies to it, as in its training",
+    "td3-belief": "sees the belief that all looks have left in place of the last one",
+    "ppo": "the same agent trained by proximal policy optimisation",
+    "recurrent-ppo": "the same with memory: an LSTM of what was seen",
     "td3-paper": "the plain recipe: the printed observation vector, TD3 as its authors published it",
 }
 
@@ -53,9 +57,13 @@ _ENTRIES = (
     ("td3-lstm", _agent("td3-lstm")),
     ("td3-lstm-plus", _agent("td3-lstm-plus")),
     ("td3-paper", _agent("td3-paper")),
+    ("td3-convex", _agent("td3-convex")),
+    ("td3-belief", _agent("td3-belief")),
+    ("ppo", _agent("ppo")),
+    ("recurrent-ppo", _agent("recurrent-ppo")),
     *(
         (weights_name(agent, "partial"), _agent(agent, "partial"))
-        for agent in ("td3", "td3-lstm", "td3-lstm-plus")
+        for agent in ("td3", "td3-lstm", "td3-lstm-plus", "td3-belief")
     ),
     (weights_name("td3", "lidar"), _agent("td3", "lidar")),
 )

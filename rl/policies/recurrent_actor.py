@@ -5,21 +5,21 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from guidance.arrays import Array
 from hda.flight.outcome import score_step
 from hda.policy import Decision
 from hda.task.observation import Observation, ScenarioView
-from rl.environment.action import PAPER_ACTIONS, ActionRanges, decide_action
-from rl.environment.encoding import Layout, encode_observation
 from rl.inference.arrays import Array32
 from rl.inference.artefacts import Artefact, ArtefactError, load_artefact
-from rl.inference.latent import LATENT_SIZE, encoder_of_card, load_encoder
-from rl.inference.networks import MapEncoder
-from rl.inference.recurrent_network import RecurrentNetwork
-from rl.policies.actor import read_actor_card
+from rl.inference.recurrent_network import RecurrentNetwork, RecurrentSizes
+from rl.policies.actor import ActorDesign, bound_action
+from rl.settings import ON_POLICY_ALGORITHMS, WITH_MEMORY
+
+_HISTORY = {"td3-lstm": ("action",), "td3-lstm-plus": ("action", "reward"), "recurrent-ppo": ()}
+"""What the LSTM of an algorithm sees beside the observation."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,16 +27,16 @@ class FlightMemory:
     """What an agent with memory carries from one decision to the next.
 
     Attributes:
-        nominal_target: [m] shape (3,), first target of the episode.
+        parts: memory of sight and steering.
         dry_mass: [kg] of the lander.
         hidden: shape (memory,), h of the LSTM.
         cell: shape (memory,), c of the LSTM.
-        action: shape (5,), last action; 0 before the first.
+        action: shape (a,), last action; 0 before the first.
         first_mass: [kg] at the first decision; None before it.
         mass: [kg] at the last decision; None before the first.
     """
 
-    nominal_target: Array
+    parts: tuple[Any, Any]
     dry_mass: float
     hidden: Array32
     cell: Array32
@@ -53,40 +53,34 @@ class FlightMemory:
 
 @dataclass(frozen=True, eq=False)
 class MemoryActor:
-    """Observation and memory -> action and memory.
+    """Observation and memory -> decision and memory.
 
     Attributes:
-        layout: observation vector that it was trained on.
-        encoder: makes the latent of a map.
-        network: LSTM and dense layers; tanh follows.
-        ranges: what its actions mean.
+        design: what it sees, and what its actions become.
+        network: LSTM and dense layers.
     """
 
-    layout: Layout
-    encoder: MapEncoder
+    design: ActorDesign
     network: RecurrentNetwork
-    ranges: ActionRanges = PAPER_ACTIONS
 
     def begin(self, view: ScenarioView) -> FlightMemory:
         """Nothing remembered."""
         zero = np.zeros(self.network.memory, np.float32)
-        return FlightMemory(view.nominal_target, view.lander.dry_mass, zero, zero, np.zeros(5, np.float32))
+        action = np.zeros(self.network.actions, np.float32)
+        return FlightMemory(self.design.begin(view), view.lander.dry_mass, zero, zero, action)
 
     def decide(self, observation: Observation, memory: FlightMemory) -> tuple[Decision, FlightMemory]:
         """Decide, and remember."""
-        latent = self.encoder.encode(observation.safety_map)
-        vector = encode_observation(self.layout, observation, memory.nominal_target, latent)
+        design = self.design
+        vector, seen = design.sight.see(observation, memory.parts[0])
         mass = observation.state.mass
-        parts = [vector, memory.action]
-        if self.network.previous_reward:
-            parts.append(np.array([memory.reward(mass)], np.float32))
-        inputs, hidden, cell = self.network.evaluate(
-            vector, np.concatenate(parts), (memory.hidden, memory.cell)
-        )
-        action = np.tanh(inputs)
+        beside = {"action": memory.action, "reward": np.array([memory.reward(mass)], np.float32)}
+        history = np.concatenate([vector, *(beside[part] for part in self.network.history)])
+        inputs, hidden, cell = self.network.evaluate(vector, history, (memory.hidden, memory.cell))
+        action = bound_action(inputs, design.algorithm)
+        decision, steered = design.steering.decide(action, observation, memory.parts[1])
         first = mass if memory.first_mass is None else memory.first_mass
-        after = FlightMemory(memory.nominal_target, memory.dry_mass, hidden, cell, action, first, mass)
-        return decide_action(action, observation, self.ranges), after
+        return decision, FlightMemory((seen, steered), memory.dry_mass, hidden, cell, action, first, mass)
 
 
 def memory_actor_from_artefact(artefact: Artefact, path: Path) -> MemoryActor:
@@ -95,14 +89,21 @@ def memory_actor_from_artefact(artefact: Artefact, path: Path) -> MemoryActor:
     Raises:
         ArtefactError: they were made for another encoding, another autoencoder, or have other shapes.
     """
-    layout, hidden, ranges = read_actor_card(artefact.card, path)
-    encoder = load_encoder(encoder_of_card(artefact.card, path))
-    memory = artefact.card.get("memory")
+    design, memory = ActorDesign.from_card(artefact.card, path), artefact.card.get("memory")
     if not isinstance(memory, int):
         raise ArtefactError(f"{path}: the card's 'memory' must be a whole number, got {memory!r}")
-    size, reward = len(layout.elements) + LATENT_SIZE, artefact.card.get("algorithm") == "td3-lstm-plus"
-    network = RecurrentNetwork.from_tensors(artefact.tensors, size, memory, hidden, reward)
-    return MemoryActor(layout, encoder, network, ranges)
+    if design.algorithm not in WITH_MEMORY:
+        known = ", ".join(WITH_MEMORY)
+        raise ArtefactError(f"{path}: algorithm must be one of {known}, got {design.algorithm!r}")
+    sizes = RecurrentSizes(
+        design.seen,
+        memory,
+        design.hidden,
+        _HISTORY[design.algorithm],
+        present=design.algorithm not in ON_POLICY_ALGORITHMS,
+        actions=design.steering.size,
+    )
+    return MemoryActor(design, RecurrentNetwork.from_tensors(artefact.tensors, sizes))
 
 
 @cache

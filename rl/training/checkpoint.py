@@ -1,8 +1,9 @@
 """Checkpoints of a training run that resume exactly: our own arrays and JSON, none of SB3's pickles.
 
-Taken between two episodes: networks, targets, optimisers, replay memory, the state of every random
-generator, and counters. What SB3 itself names as its torch state is what is kept, so that every off-policy
-algorithm of it works.
+What learns from a replay memory is kept between two episodes: networks, targets, optimisers, replay memory,
+the state of every random generator, and counters. What learns from many environments is kept between two
+updates, with the flights under way in place of a replay memory. What SB3 itself names as its torch state is
+what is kept, so that every algorithm of it works.
 """
 
 from __future__ import annotations
@@ -16,27 +17,31 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import torch
 
+from rl.environment.native.vector_env import LandingVectorEnv
+from rl.environment.native.vector_snapshot import restore_snapshot, take_snapshot
 from rl.inference.artefacts import Artefact, ArtefactError, Tensors, load_artefact, read_card, save_artefact
 from rl.learning.recurrent.td3_lstm import RecurrentTD3
 
 if TYPE_CHECKING:
     from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
+    from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 
     from rl.environment.env import LunarHDAEnv
 
-    Algorithm = OffPolicyAlgorithm | RecurrentTD3
+    Algorithm = OffPolicyAlgorithm | OnPolicyAlgorithm | RecurrentTD3
+    Environment = LunarHDAEnv | LandingVectorEnv[Any]
 
 KIND = "checkpoint"
 _REPLAY = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
 
 
-def save_checkpoint(folder: Path, algorithm: Algorithm, env: LunarHDAEnv, card: dict[str, Any]) -> Path:
+def save_checkpoint(folder: Path, algorithm: Algorithm, env: Environment, card: dict[str, Any]) -> Path:
     """Write a checkpoint and remove older ones.
 
     Args:
         folder: of the run.
-        algorithm: between two episodes: its last step ended one.
-        env: the environment that it trains on, already reset for the next episode.
+        algorithm: between two episodes: its last step ended one; or between two updates, of many.
+        env: the environment that it trains on, already reset for the next episode; or the vector.
         card: settings and whatever else the run wants back.
 
     Returns:
@@ -54,10 +59,14 @@ def save_checkpoint(folder: Path, algorithm: Algorithm, env: LunarHDAEnv, card: 
         "n_updates": algorithm._n_updates,
         "episode_num": algorithm._episode_num,
         "study_seed": env.study_seed,
-        # the environment has begun the next episode already; the resumed run begins it again
-        "next_episode": env.next_episode - 1,
     }
-    tensors = {**_network_tensors(algorithm), **_replay_tensors(algorithm)}
+    if isinstance(env, LandingVectorEnv):
+        flown = _flight_tensors(algorithm, env)
+    else:
+        # the environment has begun the next episode already; the resumed run begins it again
+        counters["next_episode"] = env.next_episode - 1
+        flown = _replay_tensors(algorithm)
+    tensors = {**_network_tensors(algorithm), **flown}
     tensors["generator/torch"] = torch.get_rng_state().numpy()
     save_artefact(path, KIND, tensors, {**card, "generators": generators, "counters": counters})
     for old in folder.glob("checkpoint-*"):
@@ -75,7 +84,7 @@ def newest_checkpoint(folder: Path) -> Path | None:
     return None
 
 
-def restore_checkpoint(path: Path, algorithm: Algorithm, env: LunarHDAEnv) -> dict[str, Any]:
+def restore_checkpoint(path: Path, algorithm: Algorithm, env: Environment) -> dict[str, Any]:
     """Put a fresh algorithm and environment where the checkpoint was taken.
 
     Args:
@@ -97,15 +106,18 @@ def restore_checkpoint(path: Path, algorithm: Algorithm, env: LunarHDAEnv) -> di
     return artefact.card
 
 
-def _restore_run(artefact: Artefact, algorithm: Algorithm, env: LunarHDAEnv) -> None:
+def _restore_run(artefact: Artefact, algorithm: Algorithm, env: Environment) -> None:
     counters, generators = artefact.card["counters"], artefact.card["generators"]
     algorithm.num_timesteps = counters["num_timesteps"]
     algorithm._n_updates = counters["n_updates"]
     algorithm._episode_num = counters["episode_num"]
-    env.continue_study(counters["study_seed"], counters["next_episode"])
-    _begin_episode(algorithm)
+    if isinstance(env, LandingVectorEnv):
+        _restore_flights(algorithm, env, counters["study_seed"], artefact.tensors)
+    else:
+        env.continue_study(counters["study_seed"], counters["next_episode"])
+        _begin_episode(algorithm)
+        _restore_replay(algorithm, artefact.tensors)
     _restore_networks(algorithm, artefact.tensors)
-    _restore_replay(algorithm, artefact.tensors)
     algorithm.action_space.np_random.bit_generator.state = generators["action_space"]
     if isinstance(algorithm, RecurrentTD3):
         algorithm.rng.bit_generator.state = generators["agent"]
@@ -114,7 +126,7 @@ def _restore_run(artefact: Artefact, algorithm: Algorithm, env: LunarHDAEnv) -> 
     torch.set_rng_state(torch.from_numpy(artefact.tensors["generator/torch"].copy()))
 
 
-def _begin_episode(algorithm: Algorithm) -> None:
+def _begin_episode(algorithm: Any) -> None:
     if isinstance(algorithm, RecurrentTD3):
         algorithm.restart_episode()
         return
@@ -174,7 +186,7 @@ def _restore_networks(algorithm: Algorithm, tensors: Tensors) -> None:
         attrgetter(name)(algorithm).data.copy_(torch.tensor(tensors[f"variable/{name}"]))
 
 
-def _replay_tensors(algorithm: Algorithm) -> Tensors:
+def _replay_tensors(algorithm: Any) -> Tensors:
     if isinstance(algorithm, RecurrentTD3):
         return {f"replay/{name}": array for name, array in algorithm.replay_buffer.tensors().items()}
     replay: Any = algorithm.replay_buffer
@@ -184,7 +196,7 @@ def _replay_tensors(algorithm: Algorithm) -> Tensors:
     return tensors
 
 
-def _restore_replay(algorithm: Algorithm, tensors: Tensors) -> None:
+def _restore_replay(algorithm: Any, tensors: Tensors) -> None:
     if isinstance(algorithm, RecurrentTD3):
         kept = {name: tensors[f"replay/{name}"] for name in algorithm.replay_buffer.tensors()}
         algorithm.replay_buffer.restore(kept)
@@ -199,3 +211,29 @@ def _restore_replay(algorithm: Algorithm, tensors: Tensors) -> None:
         getattr(replay, name)[: len(stored)] = stored
     position, full = tensors["replay/position"]
     replay.pos, replay.full = int(position), bool(full)
+
+
+def _flight_tensors(algorithm: Any, env: LandingVectorEnv[Any]) -> Tensors:
+    """Flights under way, and what the learner remembers of them."""
+    tensors: Tensors = {f"flight/{name}": part for name, part in take_snapshot(env).items()}
+    tensors["rollout/episode_starts"] = np.asarray(algorithm._last_episode_starts, np.bool_)
+    for network, memory in _memories(algorithm).items():
+        for name, part in zip(("hidden", "cell"), memory, strict=True):
+            tensors[f"rollout/{network}/{name}"] = part.numpy()
+    return tensors
+
+
+def _restore_flights(algorithm: Any, env: LandingVectorEnv[Any], study_seed: int, tensors: Tensors) -> None:
+    kept = {key.removeprefix("flight/"): part for key, part in tensors.items() if key.startswith("flight/")}
+    algorithm.get_env()._reset_seeds()  # the flights go on: no reset of the learner's begins the study again
+    algorithm._last_obs = restore_snapshot(env, study_seed, kept)
+    algorithm._last_episode_starts = tensors["rollout/episode_starts"].copy()
+    for network, memory in _memories(algorithm).items():
+        for name, part in zip(("hidden", "cell"), memory, strict=True):
+            part.copy_(torch.tensor(tensors[f"rollout/{network}/{name}"]))
+
+
+def _memories(algorithm: Any) -> dict[str, tuple[torch.Tensor, torch.Tensor]]:
+    """(hidden, cell) of the actor's and of the critic's LSTM; empty without memory."""
+    states = getattr(algorithm, "_last_lstm_states", None)
+    return {} if states is None else {"actor": states.pi, "critic": states.vf}

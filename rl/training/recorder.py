@@ -14,20 +14,34 @@ from stable_baselines3.common.callbacks import BaseCallback
 
 from hda.task.presets import Preset
 from rl.environment.env import LunarHDAEnv
+from rl.environment.native.vector_env import LunarHDAVectorEnv
 from rl.inference.artefacts import save_artefact
-from rl.settings import AgentSettings
+from rl.settings import AgentSettings, OnPolicySettings
 from rl.training.actor_export import actor_card, actor_tensors, policy_of
 from rl.training.candidates import TUNING_SEED
 from rl.training.checkpoint import save_checkpoint
 from rl.training.run_folder import TrainingPlan, append_row, truncate_rows
 from rl.training.scoring import Score, score_policy
 
+_LOSSES = (
+    ("critic_loss", "critic_loss"),
+    ("actor_loss", "actor_loss"),
+    ("critic_loss", "value_loss"),
+    ("actor_loss", "policy_gradient_loss"),
+)
+"""Names here, and in the learners' own logs: of those with a replay memory, and of proximal policies."""
+
 
 class Recorder(BaseCallback):
     """Follows a run between updates: windows of the log, validation, checkpoints, progress bar."""
 
     def __init__(
-        self, folder: Path, plan: TrainingPlan, settings: AgentSettings, env: LunarHDAEnv, progress: Progress
+        self,
+        folder: Path,
+        plan: TrainingPlan,
+        settings: AgentSettings,
+        env: LunarHDAEnv | LunarHDAVectorEnv,
+        progress: Progress,
     ) -> None:
         """Start empty; `restore` continues from a checkpoint's card."""
         super().__init__()
@@ -35,18 +49,20 @@ class Recorder(BaseCallback):
         self.progress = progress
         self.task = progress.add_task(settings.algorithm, total=plan.steps, rate=0.0, safe=0.0)
         self.window: dict[str, list[float]] = _empty_window()
-        self.episode_reward = 0.0
+        self.episode_rewards = np.zeros(getattr(env, "num_envs", 1))
         self.last_checkpoint = 0
         self.seconds_before = 0.0
         self.started = clock.perf_counter()
-        self.ended_episode = False
-        self.steps_before = 0
+        self.may_stop = isinstance(settings, OnPolicySettings)
+        self.steps_before = self.steps_seen = 0
 
     def restore(self, card: Mapping[str, Any]) -> None:
         """Take over what a checkpoint's card keeps, and drop what was logged after it."""
         self.window = {name: list(card["window"][name]) for name in _empty_window()}
         self.seconds_before = float(card["seconds"])
+        self.episode_rewards[:] = card.get("episode_rewards", 0.0)
         self.last_checkpoint = self.steps_before = int(card["counters"]["num_timesteps"])
+        self.steps_seen = self.steps_before
         for name in ("training.csv", "validation.csv"):
             truncate_rows(self.folder / name, self.last_checkpoint)
 
@@ -56,32 +72,38 @@ class Recorder(BaseCallback):
         return self.seconds_before + clock.perf_counter() - self.started
 
     def _on_step(self) -> bool:
-        self.episode_reward += float(self.locals["rewards"][0])
-        self.ended_episode = bool(self.locals["dones"][0])
-        if self.ended_episode:
-            info = self.locals["infos"][0]
-            self.window["reward"].append(self.episode_reward)
-            self.window["safe_ratio"].append(float(info["safe_site"]))
-            self.episode_reward = 0.0
+        self.episode_rewards += np.asarray(self.locals["rewards"], np.float64)
+        ended = np.flatnonzero(self.locals["dones"]).tolist()
+        for place in ended:
+            self.window["reward"].append(float(self.episode_rewards[place]))
+            self.window["safe_ratio"].append(float(self.locals["infos"][place]["safe_site"]))
+            self.episode_rewards[place] = 0.0
+        if not isinstance(self.settings, OnPolicySettings):
+            self.may_stop = bool(ended)  # a checkpoint keeps no flight of a single environment
         return True
 
+    def _has_passed(self, interval: int) -> bool:
+        """Whether a multiple of the interval lies between the last two updates."""
+        return self.num_timesteps // interval > self.steps_seen // interval
+
     def _on_rollout_start(self) -> None:
-        """Runs after the update of the step before."""
+        """Runs after the update of the step before, or of all that was flown between two updates."""
         steps = self.num_timesteps
-        if steps == self.steps_before:
+        if steps == self.steps_seen:
             return
         losses, excluded = self.logger.name_to_value, self.logger.name_to_excluded
-        for name in ("critic_loss", "actor_loss"):
-            if f"train/{name}" in losses:
+        for name, logged in _LOSSES:
+            if f"train/{logged}" in losses:
                 # taken out: not every step has an update, and each loss counts once
-                self.window[name].append(float(losses.pop(f"train/{name}")))
-                excluded.pop(f"train/{name}")
-        if steps % self.plan.log_every == 0:
+                self.window[name].append(float(losses.pop(f"train/{logged}")))
+                excluded.pop(f"train/{logged}")
+        if self._has_passed(self.plan.log_every):
             self._log_window(steps)
-        if steps % self.plan.validate_every == 0:
+        if self._has_passed(self.plan.validate_every):
             self.validate(steps)
+        self.steps_seen = steps
         due = steps - self.last_checkpoint >= self.plan.checkpoint_every
-        if self.ended_episode and due:
+        if self.may_stop and due:
             self.checkpoint()
 
     def _log_window(self, steps: int) -> None:
@@ -132,6 +154,7 @@ class Recorder(BaseCallback):
             "plan": asdict(self.plan),
             "window": self.window,
             "seconds": self.seconds,
+            "episode_rewards": self.episode_rewards.tolist(),
         }
         save_checkpoint(self.folder, self.model, self.landing_env, card)  # type: ignore[arg-type]
         self.last_checkpoint = self.num_timesteps

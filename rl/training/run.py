@@ -5,15 +5,17 @@ from __future__ import annotations
 import json
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from hda.task.presets import Preset
 from rl.environment.env import LunarHDAEnv
+from rl.environment.native.vector_env import LunarHDAVectorEnv
 from rl.inference.artefacts import library_versions
 from rl.learning.algorithms import make_algorithm
 from rl.learning.precision import matmul_precision
-from rl.settings import AgentSettings
+from rl.settings import AgentSettings, OnPolicySettings, settings_from_json
 from rl.training.actor_export import actor_card
 from rl.training.checkpoint import newest_checkpoint, restore_checkpoint
 from rl.training.run_folder import TrainingPlan, read_run
@@ -45,12 +47,12 @@ def _train(folder: Path, preset: Preset, settings: AgentSettings, plan: Training
     from stable_baselines3.common.logger import Logger, TensorBoardOutputFormat
 
     from rl.training.recorder import Recorder
+    from rl.training.vector_adapter import StableBaselinesVector
 
     checkpoint = _open_folder(folder, preset, settings, plan, resume)
-    env = LunarHDAEnv(
-        preset, layout=settings.layout, action_ranges=settings.action_ranges, encoder=settings.encoder
-    )
-    algorithm = make_algorithm(settings, env, plan.seed)
+    env = make_environment(settings, preset)
+    flown = env if isinstance(env, LunarHDAEnv) else StableBaselinesVector(env)
+    algorithm = make_algorithm(settings, flown, plan.seed)
     algorithm.set_logger(Logger(str(folder), [TensorBoardOutputFormat(str(folder / "tensorboard"))]))
     columns = (
         TextColumn("{task.description}"),
@@ -71,6 +73,19 @@ def _train(folder: Path, preset: Preset, settings: AgentSettings, plan: Training
             algorithm.learn(remaining, recorder, log_interval=10**9, reset_num_timesteps=False)
             recorder.on_rollout_start()  # what is due after the last update
     algorithm.logger.close()
+
+
+def make_environment(settings: AgentSettings, preset: Preset) -> LunarHDAEnv | LunarHDAVectorEnv:
+    """What an agent learns in: one environment, or all in one batch for what learns from many at a time.
+
+    Raises:
+        ValueError: a batch does not serve the preset.
+    """
+    options: dict[str, Any] = {"layout": settings.layout, "action_ranges": settings.action_ranges}
+    options |= {"encoder": settings.encoder, "sight": settings.sight, "guidance": settings.guidance}
+    if isinstance(settings, OnPolicySettings):
+        return LunarHDAVectorEnv(settings.environments, preset=preset, **options)
+    return LunarHDAEnv(preset, **options)
 
 
 def _open_folder(
@@ -94,6 +109,7 @@ def _open_folder(
                 f"{folder} already holds a run: pass --resume to go on with it, or another --out"
             )
         before = read_run(folder)
+        before["settings"] = json.loads(json.dumps(asdict(settings_from_json(before["settings"]))))
         changed = [name for name, value in asked.items() if before.get(name) != value]
         if changed:
             raise ValueError(

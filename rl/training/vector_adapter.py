@@ -11,7 +11,7 @@ from gymnasium.vector import AutoresetMode
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvObs, VecEnvStepReturn
 
-from rl.environment.vector_env import LandingVectorEnv
+from rl.environment.native.vector_env import LandingVectorEnv
 
 
 class StableBaselinesVector(VecEnv):

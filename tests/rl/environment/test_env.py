@@ -23,8 +23,9 @@ from hda.task.scenario import sample_scenario
 from rl.environment.action import decide_action
 from rl.environment.dispersions import Dispersions
 from rl.environment.encoding import CURVED, PRINTED, RELATIVE
-from rl.environment.env import LunarHDAEnv, LunarHDAMapEnv
+from rl.environment.env import LunarHDAEnv
 from rl.environment.episode_info import ENDING_CODES
+from rl.environment.map_env import LunarHDAMapEnv
 
 IDS = ("LunarHDA-v0", "LunarHDA-Map-v0")
 

@@ -19,8 +19,9 @@ import rl  # noqa: F401 - registers the environments
 from hda.flight.outcome import Ending
 from hda.task.presets import PRESETS
 from hda.task.scenario import sample_scenario
-from rl.environment.env import LunarHDAEnv, LunarHDAMapEnv
+from rl.environment.env import LunarHDAEnv
 from rl.environment.episode_info import ENDING_CODES
+from rl.environment.map_env import LunarHDAMapEnv
 
 IDS = ("LunarHDA-v0", "LunarHDA-Map-v0")
 KINDS = (LunarHDAEnv, LunarHDAMapEnv)

@@ -10,8 +10,8 @@ import pytest
 from hda.ground import library
 from hda.ground.library import Ground, remove_tiles
 from hda.task.presets import PRESETS
-from rl.environment.env import LunarHDAMapEnv
-from rl.environment.vector_env import LunarHDAMapVectorEnv
+from rl.environment.map_env import LunarHDAMapEnv
+from rl.environment.native.vector_env import LunarHDAMapVectorEnv
 
 
 @pytest.mark.slow

@@ -19,9 +19,10 @@ from hda.task.scenario import sample_scenario
 from rl.environment.action import decide_action
 from rl.environment.dispersions import Dispersions
 from rl.environment.encoding import encode_map
-from rl.environment.env import LunarHDAEnv, LunarHDAMapEnv
+from rl.environment.env import LunarHDAEnv
 from rl.environment.episode_info import ENDING_CODES
-from rl.environment.vector_env import LunarHDAMapVectorEnv, LunarHDAVectorEnv
+from rl.environment.map_env import LunarHDAMapEnv
+from rl.environment.native.vector_env import LunarHDAMapVectorEnv, LunarHDAVectorEnv
 from tests.equality import same
 from tests.rl.lanes import Lane
 

@@ -13,7 +13,7 @@ from gymnasium.wrappers import vector as vector_wrappers
 
 import rl  # noqa: F401 - registers the environments
 from examples.ppo_single_file import Agent
-from rl.environment.env import LunarHDAMapEnv
+from rl.environment.map_env import LunarHDAMapEnv
 
 IDS = ("LunarHDA-v0", "LunarHDA-Map-v0")
 VERSION = tuple(int(part) for part in gymnasium.__version__.split(".")[:2])

@@ -15,7 +15,7 @@ from rl.learning.algorithms import make_algorithm
 from rl.learning.box_spaces import check_environment
 from rl.learning.recurrent.td3_lstm import RecurrentTD3
 from rl.learning.td3 import FastTD3
-from rl.settings import RECIPES
+from rl.settings import OFF_POLICY_RECIPES
 
 UNIT = spaces.Box(-1.0, 1.0, (2,), np.float32)
 
@@ -71,7 +71,9 @@ def make_recurrent(env: Any) -> RecurrentTD3:
 
 
 def make_recipe(env: Any, name: str) -> Any:
-    return make_algorithm(replace(RECIPES[name], replay_size=64, hidden=(4,), random_steps=4), env, 0)
+    return make_algorithm(
+        replace(OFF_POLICY_RECIPES[name], replay_size=64, hidden=(4,), random_steps=4), env, 0
+    )
 
 
 @pytest.mark.parametrize("case", REFUSED)
@@ -81,7 +83,7 @@ def test_actions_that_cannot_be_scaled_are_refused_with_the_space_and_the_way_ou
     for make in (make_recurrent, lambda env: FastTD3("MlpPolicy", env, device="cpu")):
         with pytest.raises(ValueError, match=words):
             make(env)
-    for name in RECIPES:
+    for name in OFF_POLICY_RECIPES:
         with pytest.raises(ValueError, match=words):
             make_recipe(env, name)
 

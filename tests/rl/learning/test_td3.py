@@ -8,7 +8,7 @@ from rl.environment.action import CONTROLS
 from rl.environment.env import LunarHDAEnv
 from rl.learning.algorithms import make_algorithm
 from rl.learning.td3 import FastTD3
-from rl.settings import RECIPES, AgentSettings
+from rl.settings import OFF_POLICY_RECIPES, OffPolicyAgentSettings
 
 
 def flat_critic(actor_bias: float) -> FastTD3:
@@ -55,7 +55,9 @@ def test_the_critic_learns_while_the_actor_does_not_touch_it():
 
 
 def test_the_learning_rate_decays_linearly_between_its_ends_and_the_prior_sets_in():
-    settings = AgentSettings(learning_rate=1.0, final_learning_rate=0.0, learning_rate_decay=(100, 300))
+    settings = OffPolicyAgentSettings(
+        learning_rate=1.0, final_learning_rate=0.0, learning_rate_decay=(100, 300)
+    )
     assert [settings.learning_rate_at(step) for step in (0, 100, 200, 300, 9999)] == pytest.approx(
         [1.0, 1.0, 0.5, 0.0, 0.0]
     )
@@ -68,19 +70,19 @@ def test_the_learning_rate_decays_linearly_between_its_ends_and_the_prior_sets_i
 
 
 def test_the_algorithm_follows_its_settings():
-    model = make_algorithm(RECIPES["td3"], LunarHDAEnv(), seed=0)
+    model = make_algorithm(OFF_POLICY_RECIPES["td3"], LunarHDAEnv(), seed=0)
     assert isinstance(model, FastTD3)
     assert model.action_noise is not None
     draws = np.array([model.action_noise() for _ in range(4000)])
-    assert draws.std() == pytest.approx(RECIPES["td3"].exploration_noise, rel=0.05)
-    assert model.target_policy_noise == RECIPES["td3"].smoothing_noise
+    assert draws.std() == pytest.approx(OFF_POLICY_RECIPES["td3"].exploration_noise, rel=0.05)
+    assert model.target_policy_noise == OFF_POLICY_RECIPES["td3"].smoothing_noise
     for step, rate in ((0, 3e-4), (10**6, 3e-5)):
         model.num_timesteps = step
         assert model.lr_schedule(0.5) == pytest.approx(rate)
 
 
 def test_the_papers_recipe_is_td3_as_published():
-    recipe = RECIPES["td3-paper"]
+    recipe = OFF_POLICY_RECIPES["td3-paper"]
     assert recipe.layout == "printed"
     assert (recipe.exploration_noise, recipe.smoothing_noise, recipe.discount) == (0.1, 0.2, 0.99)
     for step in (0, 100_000, 10**6):

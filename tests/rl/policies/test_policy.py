@@ -3,6 +3,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -25,10 +26,10 @@ SIZES = (44, 256, 256, 5)
 SHIPPED = [entry.name for entry in entries()]
 
 
-def random_tensors(seed: int = 0):
+def random_tensors(seed: int = 0, sizes: tuple[int, ...] = SIZES):
     rng = np.random.default_rng(seed)
     tensors = {}
-    for k, (rows, columns) in enumerate(pairwise(SIZES)):
+    for k, (rows, columns) in enumerate(pairwise(sizes)):
         tensors[f"layer.{k}.weight"] = rng.normal(0, rows**-0.5, (rows, columns)).astype(np.float32)
         tensors[f"layer.{k}.bias"] = rng.normal(0, 0.1, columns).astype(np.float32)
     return tensors
@@ -82,12 +83,34 @@ def test_the_agent_in_the_environment_equals_the_agent_in_fly(weights, episode):
     assert terminated or truncated
 
 
+@pytest.mark.parametrize("preset", ["paper", "partial", "navigated"])
+@pytest.mark.parametrize("name", ["td3-convex", "td3-belief"])
+def test_an_agent_of_another_sight_or_guidance_flies_in_the_environment_as_in_fly(name, preset, tmp_path):
+    recipe = replace(RECIPES[name], hidden=(16,))
+    env = LunarHDAEnv(preset, sight=recipe.sight, guidance=recipe.guidance)
+    assert env.observation_space.shape is not None
+    tensors = random_tensors(2, (env.observation_space.shape[0], 16, env.steering.size))
+    save_artefact(tmp_path / "agent", "actor", tensors, actor_card(recipe))
+    scenario = sample_scenario(preset, 8, 2, "train")
+    record = fly(AgentPolicy("agent", tmp_path / "agent"), scenario)
+    vector, _ = env.reset(options={"scenario": scenario})
+    network = load_actor(tmp_path / "agent").network
+    over = False
+    for reward, decision in zip(record.rewards, record.decisions, strict=True):
+        vector, gained, terminated, truncated, _ = env.step(np.tanh(network.evaluate(vector)))
+        assert gained == reward.total
+        np.testing.assert_array_equal(env.steps[-1].flight.target, decision.site)
+        over = terminated or truncated
+    assert over
+
+
 def test_fixed_gain_takes_the_agents_sites_and_nothing_else(weights):
     scenario = sample_scenario("paper", 8, 0, "train")
     policy = ComposedPolicy("fixed", AgentSite(weights), FixedGainZemZev())
     record = fly(policy, scenario)
     for observation, decision in zip(record.observations, record.decisions, strict=True):
-        site = load_actor(weights).decide(observation, scenario.nominal_target).site
+        actor = load_actor(weights)
+        site = actor.decide(observation, actor.begin(scenario.view))[0].site
         np.testing.assert_array_equal(decision.site, site)
         assert isinstance(decision.command, ZemZevCommand)
         assert (decision.command.position_gain, decision.command.velocity_gain) == (6.0, 2.0)
@@ -104,6 +127,8 @@ def test_fixed_gain_takes_the_agents_sites_and_nothing_else(weights):
         ({"hidden": [8, 8]}, "layer 0 must be"),
         ({"hidden": "wide"}, "hidden"),
         ({"action_ranges": {"gain": 3}}, "action_ranges"),
+        ({"sight": "ears"}, "unknown sight"),
+        ({"guidance": "hope"}, "unknown guidance"),
     ],
 )
 def test_weights_of_another_version_are_refused_when_the_policy_begins(weights, change, message):

@@ -16,7 +16,7 @@ from rl.training.run_folder import TrainingPlan, read_rows
 PAPER = PRESETS["paper"]
 SMALL = {
     name: replace(RECIPES[name], hidden=(16, 16), batch_size=16, random_steps=40, replay_size=90)
-    for name in ("td3", "sac", "ddpg", "tqc")
+    for name in ("td3", "sac", "ddpg", "tqc", "td3-convex", "td3-belief")
 }
 """Networks and a replay memory so small that it wraps around within a test."""
 

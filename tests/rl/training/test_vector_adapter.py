@@ -14,7 +14,8 @@ from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor
 
 import rl  # noqa: F401 - registers the environments
-from rl.environment.env import LunarHDAEnv, LunarHDAMapEnv
+from rl.environment.env import LunarHDAEnv
+from rl.environment.map_env import LunarHDAMapEnv
 from rl.learning.td3 import FastTD3
 from rl.training.vector_adapter import StableBaselinesVector
 from tests.equality import same

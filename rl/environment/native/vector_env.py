@@ -14,16 +14,15 @@ from numpy.typing import NDArray
 from guidance.arrays import Index
 from hda.task.presets import find_preset
 from hda.task.scenario import Scenario
+from rl.environment.dispersions import DISPERSION_NAMES, refuse_unknown_options
 from rl.environment.encoding import clip_latent, encode_flights, map_into
-from rl.environment.env import (
-    DISPERSION_NAMES,
-    LandingEnv,
-    LunarHDAEnv,
-    LunarHDAMapEnv,
-    refuse_unknown_options,
-)
-from rl.environment.flight_batch import BatchSettings, FlightBatch, check_count
-from rl.environment.vector_info import Mask, blank_others, describe_batch, with_masks
+from rl.environment.env import LandingEnv, LunarHDAEnv
+from rl.environment.episode_source import EpisodeSource
+from rl.environment.map_env import LunarHDAMapEnv
+from rl.environment.native.flight_batch import BatchSettings, FlightBatch, check_count
+from rl.environment.native.vector_info import Mask, blank_others, describe_batch, with_masks
+from rl.environment.sight import LookSight
+from rl.environment.steering import GainSteering
 from rl.inference.arrays import Array32
 from rl.inference.latent import LATENT_SIZE
 
@@ -174,6 +173,16 @@ class LandingVectorEnv(VectorEnv[Seen, Array32, Any], Generic[Seen]):
         info |= with_masks(describe_batch(batch), everyone)
         return self._observation(), rewards, terminated, truncated, info
 
+    def look_again(self) -> Seen:
+        """Take the look of this instant anew in every environment, for whoever has set its flights."""
+        self._look(np.ones(self.num_envs, np.bool_))
+        return self._observation()
+
+    @property
+    def source(self) -> EpisodeSource:
+        """Which episodes are flown."""
+        return self.single.source
+
     def render(self) -> None:
         """None: a batch draws no pictures."""
 
@@ -183,9 +192,8 @@ class LandingVectorEnv(VectorEnv[Seen, Array32, Any], Generic[Seen]):
 
     def _draw(self, study: int, episodes: Index, mask: Mask, changes: dict[str, float]) -> list[Scenario]:
         """The next episode of each environment of a mask, with changed dispersions."""
-        source = self.single.source
-        source.prepare()
-        return [source.scenario(study, episode, changes) for episode in episodes[mask].tolist()]
+        self.source.prepare()
+        return [self.source.scenario(study, episode, changes) for episode in episodes[mask].tolist()]
 
     def _begin(self, mask: Mask, scenarios: list[Scenario]) -> None:
         """Begin an episode in each environment of a mask."""
@@ -219,8 +227,18 @@ class LunarHDAVectorEnv(LandingVectorEnv[Array32]):
     """Many of `LunarHDA-v0`: observations of shape (n, 44); see `LandingVectorEnv` and `LunarHDAEnv`."""
 
     def make_single(self, **options: Any) -> LunarHDAEnv:
-        """One of them."""
-        return LunarHDAEnv(**options)
+        """One of them.
+
+        Raises:
+            ValueError: another sight or guidance, which a batch does not serve.
+        """
+        single = LunarHDAEnv(**options)
+        if not isinstance(single.sight, LookSight) or not isinstance(single.steering, GainSteering):
+            raise ValueError(
+                "sight must be 'look' and guidance 'zem-zev' in a native vector:"
+                " gymnasium.make_vec(..., vectorization_mode='sync') flies the others"
+            )
+        return single
 
     def look(self, places: Index) -> Parts:
         """The 44 numbers of each."""

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rl.environment.episode_info import ENDING_CODES, study_number
-from rl.environment.flight_batch import REWARD_TERMS, FlightBatch, lengths
+from rl.environment.native.flight_batch import REWARD_TERMS, FlightBatch, lengths
 
 Mask = NDArray[np.bool_]
 

@@ -28,7 +28,7 @@ from hda.task.presets import Preset
 from hda.task.scenario import Scenario, ground_point
 from rl.environment.action import ActionRanges, scale_actions
 from rl.environment.encoding import SeenFlight
-from rl.environment.flight_kernels import Flights, Vehicle, fly_decisions, take_look
+from rl.environment.native.flight_kernels import Flights, Vehicle, fly_decisions, take_look
 from rl.inference.arrays import Array32
 
 REWARD_TERMS = tuple(term.name for term in fields(RewardTerms))
