@@ -23,6 +23,7 @@ from hda.flight.held_thrust import (
     fall_freely,
     hold_period,
 )
+from hda.flight.rigid.turning import PlainTurning, feel_engine, keep_state, name_turning
 from hda.navigation.steering import PlainSensing, Sensing, name_sensing, sense
 from hda.safety.touchdown_stance import Footing
 
@@ -65,6 +66,7 @@ _PlainConditions = tuple[
     float,
     Array,
     _PlainFooting | None,
+    PlainTurning | None,
 ]
 """`FlightConditions` without names."""
 
@@ -93,6 +95,7 @@ def _fly_zem_zev(
         if remaining <= 0.5 * period:
             commanded[k] = 0.0
             time[k + 1] = time[k] + fall_freely(path[k], conditions, path[k + 1])
+            keep_state(conditions.turning, k + 1)
             return k + 2, TOUCHDOWN, limited
         if k == periods:
             break
@@ -104,6 +107,7 @@ def _fly_zem_zev(
         if limit_into(commanded[k], vehicle.min_thrust, vehicle.max_thrust, vehicle.pointing_limit):
             limited += 1
         flown, status = hold_period(path[k], commanded[k], conditions, path[k + 1])
+        keep_state(conditions.turning, k + 1)
         time[k + 1] = time[k] + flown
         if status != FLYING:
             return k + 2, status, limited
@@ -140,6 +144,7 @@ def _fly_plan(
         if k >= planned:
             commanded[k] = 0.0
             time[k + 1] = time[k] + fall_freely(path[k], conditions, path[k + 1])
+            keep_state(conditions.turning, k + 1)
             return k + 2, TOUCHDOWN, limited
         if k == periods:
             break
@@ -153,11 +158,14 @@ def _fly_plan(
         if limit_into(commanded[k], vehicle.min_thrust, vehicle.max_thrust, vehicle.pointing_limit):
             limited += 1
         flown, status = hold_period(path[k], commanded[k], conditions, path[k + 1])
+        keep_state(conditions.turning, k + 1)
         time[k + 1] = time[k] + flown
         if status != FLYING:
             return k + 2, status, limited
         sense(sensing, (path[k], path[k + 1], flown, k), gravity, navigation)
-        estimate = _estimate_error(path[k], path[k + 1], commanded[k], period, gravity, estimate)
+        told = _estimate_error(path[k], path[k + 1], commanded[k], period, gravity, estimate)
+        least = _LEAST_TELLING * path[k, 6] * period
+        estimate = feel_engine(conditions.turning, estimate, told, least)
     return periods + 1, FLYING, limited
 
 
@@ -197,7 +205,7 @@ def _name_footing(plain: _PlainFooting | None) -> Footing | None:
 
 @compile_kernel
 def _name_conditions(conditions: _PlainConditions) -> FlightConditions:
-    period, plane, gravity, vehicle, thrust_error, navigation, footing = conditions
+    period, plane, gravity, vehicle, thrust_error, navigation, footing, turning = conditions
     return FlightConditions(
         period,
         plane,
@@ -206,6 +214,7 @@ def _name_conditions(conditions: _PlainConditions) -> FlightConditions:
         thrust_error,
         navigation,
         _name_footing(footing),
+        name_turning(turning),
     )
 
 
