@@ -26,6 +26,7 @@ from hda.navigation.navigation_state import NavigationState
 from hda.policy import Decision, Memory, Policy, PrivilegedPolicy
 from hda.sensing.lidar import look
 from hda.sensing.ranging import RangingLidar
+from hda.sensing.sensor_axis import sensor_axis
 from hda.task import estimation
 from hda.task.measurement import measure_look, measured_target
 from hda.task.observation import Observation
@@ -105,13 +106,14 @@ def observe(scenario: Scenario, flight: Flight) -> Observation:
     late = flight.index > 0 and flight.time_to_go <= _LATE * rules.decision_interval
     stance, ground = None if late else scenario.preset.stance, None
     if isinstance(lidar, RangingLidar):
-        ground = measure_look(scenario, lidar, flight.index, flight.state, aim, error)
+        ground = measure_look(scenario, lidar, flight.index, body or flight.state, aim, error)
         safety_map = ground.safety_map(flight.target, width, lidar.pixels)
     elif lidar.dropout > 0.0 and scenario.streams.map_is_missing(flight.index, lidar.dropout):
         safety_map = np.zeros((lidar.pixels, lidar.pixels), dtype=np.float32)
     else:
         noise = scenario.streams.look(flight.index, lidar.pixels)
-        safety_map = look(lidar, position, aim, scenario.tile.probability, noise)
+        axis = None if body is None else sensor_axis(body.attitude)
+        safety_map = look(lidar, position, aim, scenario.tile.probability, noise, axis)
     return Observation(
         index=flight.index,
         time=flight.index * rules.decision_interval,
@@ -171,11 +173,12 @@ def advance(scenario: Scenario, flight: Flight, decision: Decision) -> Step:
 def _meet_ground(scenario: Scenario, segment: Segment, site: Array) -> Contact:
     """How the flight's last segment met the plane or the ground; `site` is where it flew to."""
     landed, final = segment.status is not FlightStatus.FLYING, segment.final_state
+    under_power = bool(segment.commanded[-1].any())
     return Contact(
         landed=landed,
         safe_cell=landed and scenario.tile.is_safe(final.position),
         tank_empty=segment.status is FlightStatus.TANK_EMPTY,
-        report=judge_touchdown(scenario, final, site, bool(segment.commanded[-1].any())) if landed else None,
+        report=judge_touchdown(scenario, final, site, under_power, segment.final_body) if landed else None,
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from guidance.arrays import Array
+from guidance.rigid_body.state import RigidState
 from guidance.state import State
 from hda.safety.touchdown_stance import Stance
 from hda.sensing.measured_look import MeasuredGround, measure_ground
@@ -13,7 +14,7 @@ from hda.task.scenario import Scenario
 
 
 def measure_look(
-    scenario: Scenario, lidar: RangingLidar, index: int, state: State, aim: Array, error: Array
+    scenario: Scenario, lidar: RangingLidar, index: int, state: State | RigidState, aim: Array, error: Array
 ) -> MeasuredGround:
     """Scan the ground about a point, and assess it where the vehicle believes it to lie.
 
@@ -23,7 +24,7 @@ def measure_look(
         scenario: the episode.
         lidar: its sensor.
         index: number of the look.
-        state: the true state.
+        state: the true state; the sensor turns with a rigid body.
         aim: [m] shape (3,), where the look really points.
         error: shape (6,), estimated minus true position [m] and velocity [m/s].
     """

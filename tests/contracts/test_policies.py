@@ -40,7 +40,7 @@ pytestmark = pytest.mark.parametrize("name", names())
 
 @pytest.fixture(scope="module")
 def scenarios() -> list[Scenario]:
-    """Twenty starts: by map, by measured looks, on hard ground, with few rays, by a filter, as a rigid body."""
+    """Twenty starts: by map, by measured looks, on hard ground, with few rays, by a filter, a rigid body."""
     presets = ("paper", "lidar", "hard", "lidar-coarse", "navigated", "rigid-body")
     return [hda.sample_scenario(presets[k % 6], 17, k) for k in range(20)]
 
