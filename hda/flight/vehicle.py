@@ -26,7 +26,7 @@ from hda.flight import held_thrust
 from hda.flight.interval import enter_plan, enter_zem_zev, plain_footing
 from hda.flight.rigid.turning import PlainTurning, begin_turning
 from hda.navigation.steering import Sensing, plain_sensing
-from hda.policy import Decision, ZemZevCommand
+from hda.policy import Command, Decision, PlanCommand, ZemZevCommand
 from hda.safety.touchdown_stance import Footing
 
 
@@ -150,17 +150,17 @@ def fly_over(
     Raises:
         ValueError: a plan was sampled at another control period than the vehicle's.
     """
-    periods = interval.count
+    periods, command = interval.count, decision.command
     time, path, commanded = np.empty(periods + 2), np.empty((periods + 2, 7)), np.empty((periods + 1, 3))
     plane, limits = float(decision.site[2]), _vehicle_limits(vehicle)
     gravity, ground = surroundings.gravity, surroundings.footing
     footing = None if ground is None else plain_footing(ground)
     sensing = None if errors.sensing is None else plain_sensing(errors.sensing)
     believed = errors.navigation.copy()
-    turning = _begin_turning(state, vehicle, interval, gravity, errors.tilt)
+    turning = _begin_turning(state, vehicle, interval, gravity, errors.tilt, command)
     conditions = (interval.period, plane, gravity, limits, errors.thrust, believed, footing, turning)
     point = state.point if isinstance(state, RigidState) else state
-    start, log, command = point.as_array(), (time, path, commanded), decision.command
+    start, log = point.as_array(), (time, path, commanded)
     if isinstance(command, ZemZevCommand):
         rate = command.time_to_go_rate
         asked = (command.position_gain, command.velocity_gain, command.time_to_go, rate)
@@ -170,8 +170,7 @@ def fly_over(
         reference = command.reference
         _check_period(reference.control_period, interval.period)
         parts = (reference.position, reference.velocity, reference.thrust_acceleration)
-        position_gain, velocity_gain = command.gains
-        feedback = position_gain, velocity_gain, command.assumed_error
+        feedback = command.lateral_gains or command.gains, command.gains, command.assumed_error
         nodes, status, limited = enter_plan(start, parts, feedback, conditions, sensing, log)
         time_to_go = reference.duration - float(time[nodes - 1])
     return Segment(
@@ -192,12 +191,14 @@ def _begin_turning(
     interval: ControlPeriods,
     gravity: Array,
     tilt: Array,
+    command: Command,
 ) -> PlainTurning | None:
     """The body at the start of an interval; None of a point mass."""
     if not isinstance(vehicle, RigidBody):
         return None
-    start = RigidState.parse(state)
-    return begin_turning(start, vehicle, interval.loop, gravity, tilt, interval.count + 2)
+    lead = command.lead if isinstance(command, PlanCommand) else 0.0
+    parts = vehicle.numbers(gravity), interval.loop.numbers, tilt, lead
+    return begin_turning(RigidState.parse(state), *parts, interval.count + 2)
 
 
 def _vehicle_limits(vehicle: Lander | RigidBody) -> tuple[float, float, float, float, float]:

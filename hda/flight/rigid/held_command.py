@@ -15,7 +15,7 @@ import numpy as np
 
 from guidance.arrays import Array
 from guidance.kernel import compile_kernel
-from guidance.rigid_body.attitude_loop import command_into
+from guidance.rigid_body.attitude_loop import drive_into
 from guidance.rigid_body.motion import fly_into
 from hda.flight.rigid.turning import Turning, believe_into, reckon_engine
 from hda.safety.touchdown_stance import Footing, contact_height, highest_around
@@ -140,7 +140,7 @@ def _fly_piece(
     start, thrust, torque = state.copy(), np.zeros((2, 3)), np.zeros((2, 3))
     believed = state.copy()
     believe_into(state[6:10], turning.tilt, believed[6:10])
-    command_into(believed, wanted, turning.body, turning.loop, thrust[0], torque[0])
+    drive_into(believed, (wanted, turning.aim), turning.body, turning.loop, (thrust[0], torque[0]))
     commanded = thrust[0, 2] if burns and state[13] > dry_mass else 0.0
     thrust[:, 2] = commanded * (1.0 + error)
     torque[1] = torque[0]
@@ -180,6 +180,7 @@ def fall_body(turning: Turning, limits: tuple[float, float], footing: Footing | 
     """
     plane, dry_mass = limits
     time, nothing = 0.0, np.zeros(3)
+    turning.aim[:] = 0.0
     if turning.state[2] <= _contact(turning.state, plane, footing):
         _give(turning, out)
         return time
@@ -204,7 +205,8 @@ def hold_command(
 
     Args:
         turning: the body.
-        commanded: [N] shape (3,), site frame.
+        commanded: [N] shape (3,), site frame; the engine gives what of it lies along the body, which points
+            along `turning.aim`.
         limits: control period [s], plane [m], relative error of the thrust, dry mass [kg].
         footing: the lander over the true ground; None: the plane counts.
         out: shape (7,), written: the state reached.

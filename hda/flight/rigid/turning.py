@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike
 
 from guidance.arrays import Array
 from guidance.kernel import compile_kernel
-from guidance.rigid_body.attitude_loop import AttitudeLoop, LoopNumbers
-from guidance.rigid_body.body import BodyNumbers, RigidBody
+from guidance.rigid_body.attitude_loop import LoopNumbers
+from guidance.rigid_body.body import BodyNumbers
 from guidance.rigid_body.state import SIZE, RigidState
 from guidance.validation import finite_vector
 
@@ -31,6 +31,9 @@ class Turning(NamedTuple):
         path: shape (m + 1, 17), the state at each control instant.
         engine: shape (3,): thrust [N] that the lander reckons with by its commands and the engine's lag, and
             over the newest period the impulse [N s] that it reckons with and the one that it feels.
+        aim: [N] shape (3,), site frame, along which the body points in the present period; its size is of no
+            account.
+        lead: [s] by which it points ahead of a plan.
     """
 
     state: Array
@@ -39,6 +42,8 @@ class Turning(NamedTuple):
     loop: LoopNumbers
     path: Array
     engine: Array
+    aim: Array
+    lead: float
 
 
 PlainTurning = tuple[
@@ -48,12 +53,14 @@ PlainTurning = tuple[
     tuple[float, float, float],
     Array,
     Array,
+    Array,
+    float,
 ]
 """`Turning` without names: numba takes plain tuples from Python several times as fast."""
 
 
 def begin_turning(
-    state: RigidState, body: RigidBody, loop: AttitudeLoop, gravity: Array, tilt: Array, nodes: int
+    state: RigidState, body: BodyNumbers, loop: LoopNumbers, tilt: Array, lead: float, nodes: int
 ) -> PlainTurning:
     """A body made ready for an interval of at most `nodes` nodes.
 
@@ -61,15 +68,15 @@ def begin_turning(
         state: where it starts.
         body: the vehicle.
         loop: the gains.
-        gravity: [m/s^2] shape (3,).
         tilt: [rad] shape (3,), true minus believed attitude.
+        lead: [s] by which it points ahead of a plan.
         nodes: of the path.
     """
     engine = np.array([float(np.linalg.norm(state.thrust)), 0.0, 0.0])
     path = np.empty((nodes, SIZE))
     path[0] = state.as_array()
-    numbers = tuple(body.numbers(gravity))
-    return path[0].copy(), tilt, numbers, tuple(loop.numbers), path, engine  # pyright: ignore[reportReturnType]
+    state_now, aim = path[0].copy(), np.zeros(3)
+    return state_now, tilt, tuple(body), tuple(loop), path, engine, aim, lead  # pyright: ignore[reportReturnType]
 
 
 @compile_kernel
@@ -77,8 +84,8 @@ def name_turning(plain: PlainTurning | None) -> Turning | None:
     """Give a plain tuple its names."""
     if plain is None:
         return None
-    state, tilt, body, loop, path, engine = plain
-    return Turning(state, tilt, BodyNumbers(*body), LoopNumbers(*loop), path, engine)
+    state, tilt, body, loop, path, engine, aim, lead = plain
+    return Turning(state, tilt, BodyNumbers(*body), LoopNumbers(*loop), path, engine, aim, lead)
 
 
 @compile_kernel
