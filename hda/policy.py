@@ -70,21 +70,27 @@ class PlanCommand:
 
     Attributes:
         reference: states at the control instants from this decision on.
-        gains: (K_r [1/s^2], K_v [1/s]) of the feedback about it.
+        gains: (K_r [1/s^2], K_v [1/s]) of the feedback about it, along each axis.
         assumed_error: relative error of the thrust that the feedback reckons with until it has felt the
             engine for a control period.
+        lateral_gains: as `gains`, across the vertical, if they are others there: a rigid body throttles
+            sooner than it turns.
+        lead: [s] by which a rigid body points ahead of the reference; a point mass needs none.
 
     Raises:
-        ValueError: the assumed error is -1 or less: no engine answers, or above 1.
+        ValueError: the assumed error is -1 or less: no engine answers, or above 1; or the lead is negative.
     """
 
     reference: TrackingReference
     gains: tuple[float, float]
     assumed_error: float = 0.0
+    lateral_gains: tuple[float, float] | None = None
+    lead: float = 0.0
 
     def __post_init__(self) -> None:
         """Refuse an engine that no command moves."""
         finite_number("assumed_error", self.assumed_error, above=-1.0, at_most=1.0)
+        finite_number("lead", self.lead, at_least=0.0)
 
 
 Command = ZemZevCommand | PlanCommand

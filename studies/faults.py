@@ -1,6 +1,7 @@
 """Each named fault of the navigation sensors, flown by policies on the same episodes; why they failed.
 
-The faults are those of `hda.navigation.NAVIGATION_FAULTS`; the filter knows of each. Beside the ratios stands
+The faults are those of `hda.navigation.NAVIGATION_FAULTS`; the filter knows of each. On a preset with a rigid
+body its harder variants, `hda.task.BODY_VARIANTS`, are flown too. Beside the ratios stands
 the fall of success against the same episodes without a fault, with its paired 95 % interval, and what
 `studies.failures` finds in the first failures, each flown again.
 """
@@ -19,6 +20,7 @@ from rich.progress import track
 from guidance.console import tolerate_encoding
 from guidance.validation import finite_number, unknown_name
 from hda.navigation.system import NAVIGATION_FAULTS, add_fault
+from hda.task.body_variants import BODY_VARIANTS, vary_body
 from hda.task.presets import Preset, find_preset
 from studies.campaign.command_line import choose_policies, open_folder, resumable
 from studies.campaign.journal import Journal, open_journal
@@ -107,11 +109,17 @@ def fault_presets(preset: Preset, wanted: Sequence[str]) -> dict[str, Preset]:
         raise ValueError(f"preset {preset.name!r} has no navigation filter: fly the faults on `navigated`")
     if not wanted:
         raise ValueError("faults must name at least one fault")
+    names = (*NAVIGATION_FAULTS, *(() if preset.body is None else BODY_VARIANTS))
     for name in wanted:
-        if name != "all" and name not in NAVIGATION_FAULTS:
-            raise ValueError(unknown_name("navigation fault", name, ("all", *NAVIGATION_FAULTS)))
-    chosen = [name for name in NAVIGATION_FAULTS if name in wanted or "all" in wanted]
-    faulty = {name: replace(preset, navigation=add_fault(preset.navigation, name)) for name in chosen}
+        if name != "all" and name not in names:
+            raise ValueError(unknown_name("navigation fault", name, ("all", *names)))
+    chosen = [name for name in names if name in wanted or "all" in wanted]
+    faulty = {}
+    for name in chosen:
+        if name in BODY_VARIANTS:
+            faulty[name] = vary_body(preset, name)
+        else:
+            faulty[name] = replace(preset, navigation=add_fault(preset.navigation, name))
     return {NO_FAULT: preset, **faulty}
 
 

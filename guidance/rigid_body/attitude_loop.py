@@ -135,12 +135,34 @@ def command_into(
         thrust: [N] shape (3,), written: along the body's z axis, as much as `wanted` has along it now.
         torque: [N m] shape (3,), written.
     """
-    admissible = wanted.copy()
+    drive_into(state, (wanted, wanted), body, loop, (thrust, torque))
+
+
+@compile_kernel
+def drive_into(
+    state: Array,
+    wanted: tuple[Array, Array],
+    body: BodyNumbers,
+    loop: LoopNumbers,
+    commands: tuple[Array, Array],
+) -> None:
+    """As `command_into`, where the body may point elsewhere than along its thrust: it turns ahead of it.
+
+    Args:
+        state: shape (17,).
+        wanted: [N] shape (3,) each, site frame: the thrust, and a vector to point along, of any size.
+        body: the vehicle.
+        loop: the gains.
+        commands: shape (3,) each, written: thrust [N] and torque [N m].
+    """
+    thrust, torque = commands
+    admissible, aim = wanted[0].copy(), wanted[1].copy()
     limit_into(admissible, body.min_thrust, body.max_thrust, body.tilt_limit)
+    limit_into(aim, body.min_thrust, body.max_thrust, body.tilt_limit)
     direction = np.zeros(3)
     direction[2] = 1.0
-    if admissible[0] != 0.0 or admissible[1] != 0.0 or admissible[2] != 0.0:
-        direction[:] = admissible
+    if aim[0] != 0.0 or aim[1] != 0.0 or aim[2] != 0.0:
+        direction[:] = aim
     attitude = np.empty(4)
     point_into(direction, heading_angle(state[6:10]), attitude)
     torque_into(state, attitude, body, loop, torque)

@@ -14,19 +14,21 @@ from typing import Any
 import numpy as np
 
 from guidance.arrays import Array
+from guidance.rigid_body.state import RigidState
 from guidance.state import State
 from guidance.upright_time import upright_time_to_go
 from hda.flight.outcome import Contact, Outcome, RewardTerms, classify, score_step
 from hda.flight.record import EpisodeRecord
+from hda.flight.rigid.turning import believed_attitude
 from hda.flight.touchdown_report import judge_touchdown
 from hda.flight.vehicle import ControlPeriods, FlightErrors, FlightStatus, Segment, Surroundings, fly_over
 from hda.navigation.navigation_state import NavigationState
 from hda.policy import Decision, Memory, Policy, PrivilegedPolicy
-from hda.safety.touchdown_stance import Stance
 from hda.sensing.lidar import look
-from hda.sensing.measured_look import MeasuredGround, measure_ground
-from hda.sensing.ranging import RangingLidar, scan
+from hda.sensing.ranging import RangingLidar
+from hda.sensing.sensor_axis import sensor_axis
 from hda.task import estimation
+from hda.task.measurement import measure_look, measured_target
 from hda.task.observation import Observation
 from hda.task.scenario import Scenario, ground_point
 
@@ -43,6 +45,7 @@ class Flight:
         target: [m] shape (3,), current target, in the frame of the estimated position.
         time_to_go: [s] what remains of the commanded time to go.
         navigation: the lander's filter, with what this look tells of the site; None on a preset without one.
+        body: present state with attitude, rates and engine, the true one; None for a point mass.
     """
 
     index: int
@@ -50,6 +53,7 @@ class Flight:
     target: Array
     time_to_go: float
     navigation: NavigationState | None = None
+    body: RigidState | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,8 +89,9 @@ def begin_flight(scenario: Scenario) -> Flight:
     target = scenario.nominal_target
     navigation = estimation.begin_estimate(scenario)
     estimate = estimation.displaced(state, estimation.estimation_error(scenario, navigation, state, target))
-    clock = upright_time_to_go(estimate, target, preset.lander, preset.gravity)
-    return Flight(0, state, target, clock, navigation)
+    clock = upright_time_to_go(estimate, target, preset.guided_lander, preset.gravity)
+    body = None if preset.body is None else RigidState.parse(state)
+    return Flight(0, state, target, clock, navigation, body)
 
 
 def observe(scenario: Scenario, flight: Flight) -> Observation:
@@ -97,57 +102,32 @@ def observe(scenario: Scenario, flight: Flight) -> Observation:
     aim = estimation.look_aim(scenario, flight.target, error)
     estimate, width = estimation.displaced(flight.state, error), lidar.width(position, aim)
     rules = scenario.preset.rules
+    body, tilt = flight.body, estimation.attitude_error(scenario)
     late = flight.index > 0 and flight.time_to_go <= _LATE * rules.decision_interval
     stance, ground = None if late else scenario.preset.stance, None
     if isinstance(lidar, RangingLidar):
-        ground = _measure(scenario, lidar, flight, error)
+        ground = measure_look(scenario, lidar, flight.index, body or flight.state, aim, error)
         safety_map = ground.safety_map(flight.target, width, lidar.pixels)
     elif lidar.dropout > 0.0 and scenario.streams.map_is_missing(flight.index, lidar.dropout):
         safety_map = np.zeros((lidar.pixels, lidar.pixels), dtype=np.float32)
     else:
         noise = scenario.streams.look(flight.index, lidar.pixels)
-        safety_map = look(lidar, position, aim, scenario.tile.probability, noise)
+        axis = None if body is None else sensor_axis(body.attitude)
+        safety_map = look(lidar, position, aim, scenario.tile.probability, noise, axis)
     return Observation(
         index=flight.index,
         time=flight.index * rules.decision_interval,
         state=estimate,
-        target=_measured_target(stance, flight, ground),
+        target=measured_target(stance, flight.index, flight.target, ground),
         safety_map=safety_map,
         width=width,
         time_to_go=flight.time_to_go,
         ground=ground,
         stance=stance,
         covariance=None if flight.navigation is None else flight.navigation.relative_covariance,
+        attitude=None if body is None else believed_attitude(body.attitude, tilt),
+        rates=None if body is None else body.rates,
     )
-
-
-def _measured_target(stance: Stance | None, flight: Flight, ground: MeasuredGround | None) -> Array:
-    """The target at the height of this look's ground; as it was where sites keep the target's height.
-
-    After the first look an earlier height is kept where this one misses the ground of a pad.
-    """
-    target = flight.target
-    if stance is None or ground is None:
-        return target
-    height, pads = ground.site_height(stance, float(target[0]), float(target[1]))
-    if flight.index > 0 and pads < stance.pads.shape[0]:
-        return target
-    return np.array([target[0], target[1], height if pads > 0 else ground.middle_height(float(target[2]))])
-
-
-def _measure(scenario: Scenario, lidar: RangingLidar, flight: Flight, error: Array) -> MeasuredGround:
-    """Scan the ground about the target, and assess it where the vehicle believes it to lie.
-
-    The sensor points relative to the vehicle: an error of the estimated position moves the points with it.
-    """
-    draws = scenario.streams.scan(flight.index, lidar.rays)
-    aim = estimation.look_aim(scenario, flight.target, error)
-    tile = scenario.tile
-    cloud = scan(lidar, tile.elevation, flight.state, aim, draws, tile.highest)
-    position = flight.state.position + error[:3]
-    shift = position - flight.state.position
-    aim = aim + shift  # the plane's height is believed as wrongly as the vehicle's own
-    return measure_ground(cloud, lidar, position, aim, scenario.preset.criteria)
 
 
 def advance(scenario: Scenario, flight: Flight, decision: Decision) -> Step:
@@ -168,18 +148,18 @@ def advance(scenario: Scenario, flight: Flight, decision: Decision) -> Step:
     error = estimation.estimation_error(scenario, flight.navigation, flight.state, flight.target)
     sensing = estimation.open_sensing(scenario, flight.navigation, flight.target, decision.site, flight.index)
     segment = fly_over(
-        flight.state,
+        flight.body or flight.state,
         decision,
-        preset.lander,
+        preset.vehicle,
         Surroundings(np.array(preset.gravity), scenario.footing),
-        ControlPeriods(rules.control_period, rules.control_periods),
-        FlightErrors(thrust_error, error, sensing),
+        ControlPeriods(rules.control_period, rules.control_periods, preset.attitude_loop),
+        FlightErrors(thrust_error, error, sensing, estimation.attitude_error(scenario)),
     )
     state, landed = segment.final_state, segment.status is not FlightStatus.FLYING
     site, following, navigation = decision.site, flight.index + 1, None
     if not landed:
         navigation = estimation.next_estimate(scenario, flight.navigation, sensing, state, site, following)
-    after = Flight(following, state, site, segment.time_to_go, navigation)
+    after = Flight(following, state, site, segment.time_to_go, navigation, segment.final_body)
     truncated = not landed and after.index >= rules.max_decisions
     initial = scenario.initial_state
     outcome = None
@@ -193,11 +173,12 @@ def advance(scenario: Scenario, flight: Flight, decision: Decision) -> Step:
 def _meet_ground(scenario: Scenario, segment: Segment, site: Array) -> Contact:
     """How the flight's last segment met the plane or the ground; `site` is where it flew to."""
     landed, final = segment.status is not FlightStatus.FLYING, segment.final_state
+    under_power = bool(segment.commanded[-1].any())
     return Contact(
         landed=landed,
         safe_cell=landed and scenario.tile.is_safe(final.position),
         tank_empty=segment.status is FlightStatus.TANK_EMPTY,
-        report=judge_touchdown(scenario, final, site, bool(segment.commanded[-1].any())) if landed else None,
+        report=judge_touchdown(scenario, final, site, under_power, segment.final_body) if landed else None,
     )
 
 

@@ -14,10 +14,9 @@ from guidance.arrays import Array
 from guidance.dynamics import propagate_into
 from guidance.kernel import compile_kernel
 from hda.flight.ground_contact import Motion, fall_to_ground, hold_over_ground
+from hda.flight.rigid.held_command import FLYING, TANK_EMPTY, TOUCHDOWN, fall_body, hold_command
+from hda.flight.rigid.turning import Turning
 from hda.safety.touchdown_stance import Footing
-
-FLYING, TOUCHDOWN, TANK_EMPTY = 0, 1, 2
-"""Where a period leaves the vehicle: `hda.flight.vehicle.FlightStatus` as plain numbers."""
 
 
 class VehicleLimits(NamedTuple):
@@ -51,6 +50,7 @@ class FlightConditions(NamedTuple):
             it in place from period to period.
         footing: the lander over the true ground; None: the flight ends on the plane. What is None compiles to
             nothing.
+        turning: the rigid body that flies, whose state goes on from period to period; None: a point mass.
     """
 
     period: float
@@ -60,6 +60,7 @@ class FlightConditions(NamedTuple):
     thrust_error: float
     navigation_error: Array
     footing: Footing | None = None
+    turning: Turning | None = None
 
 
 @compile_kernel
@@ -154,9 +155,18 @@ def _fall(start: Array, gravity: Array, plane: float, footing: Footing | None, o
 
 
 @compile_kernel
+def _fall_as(start: Array, conditions: FlightConditions, turning: Turning | None, out: Array) -> float:
+    """A fall of a body or a point mass; an argument of its own for the same reason as in `_hold`."""
+    if turning is not None:
+        limits = (conditions.plane, conditions.vehicle.dry_mass)
+        return fall_body(turning, limits, conditions.footing, out)
+    return _fall(start, conditions.gravity, conditions.plane, conditions.footing, out)
+
+
+@compile_kernel
 def fall_freely(start: Array, conditions: FlightConditions, out: Array) -> float:
     """Fall freely to the plane, or to the true ground where there is one; return the time it took."""
-    return _fall(start, conditions.gravity, conditions.plane, conditions.footing, out)
+    return _fall_as(start, conditions, conditions.turning, out)
 
 
 @compile_kernel
@@ -164,7 +174,18 @@ def hold_period(
     start: Array, commanded: Array, conditions: FlightConditions, out: Array
 ) -> tuple[float, int]:
     """Apply a command for one period, ended early by the ground or the tank: (time flown, status)."""
+    return _hold_as(start, commanded, conditions, conditions.turning, out)
+
+
+@compile_kernel
+def _hold_as(
+    start: Array, commanded: Array, conditions: FlightConditions, turning: Turning | None, out: Array
+) -> tuple[float, int]:
+    """A period of a body or a point mass."""
     vehicle = conditions.vehicle
+    if turning is not None:
+        limits = (conditions.period, conditions.plane, conditions.thrust_error, vehicle.dry_mass)
+        return hold_command(turning, commanded, limits, conditions.footing, out)
     applied = np.empty(3)
     for axis in range(3):
         applied[axis] = commanded[axis] * (1.0 + conditions.thrust_error)

@@ -23,6 +23,8 @@ from hda.flight.held_thrust import (
     fall_freely,
     hold_period,
 )
+from hda.flight.rigid.pointing import aim_ahead, aim_along, steer_across
+from hda.flight.rigid.turning import PlainTurning, feel_engine, keep_state, name_turning
 from hda.navigation.steering import PlainSensing, Sensing, name_sensing, sense
 from hda.safety.touchdown_stance import Footing
 
@@ -65,6 +67,7 @@ _PlainConditions = tuple[
     float,
     Array,
     _PlainFooting | None,
+    PlainTurning | None,
 ]
 """`FlightConditions` without names."""
 
@@ -93,17 +96,22 @@ def _fly_zem_zev(
         if remaining <= 0.5 * period:
             commanded[k] = 0.0
             time[k + 1] = time[k] + fall_freely(path[k], conditions, path[k + 1])
+            keep_state(conditions.turning, k + 1)
             return k + 2, TOUCHDOWN, limited
         if k == periods:
             break
         for number in range(6):
             seen[number] = path[k, number] + conditions.navigation_error[number]
         zem_zev_into(seen, site, gains, remaining, gravity, commanded[k])
+        left = remaining / command.time_to_go_rate
+        steer_across(conditions.turning, seen, site, gains, left, commanded[k])
         for axis in range(3):
             commanded[k, axis] *= path[k, 6]
+        aim_along(conditions.turning, commanded[k], left)
         if limit_into(commanded[k], vehicle.min_thrust, vehicle.max_thrust, vehicle.pointing_limit):
             limited += 1
         flown, status = hold_period(path[k], commanded[k], conditions, path[k + 1])
+        keep_state(conditions.turning, k + 1)
         time[k + 1] = time[k] + flown
         if status != FLYING:
             return k + 2, status, limited
@@ -115,14 +123,14 @@ def _fly_zem_zev(
 def _fly_plan(
     start: Array,
     reference: _Reference,
-    feedback: tuple[TrackingGains, float],
+    feedback: tuple[TrackingGains, TrackingGains, float],
     conditions: FlightConditions,
     sensing: Sensing | None,
     log: _Log,
 ) -> tuple[int, int, int]:
     """Track a reference for one interval; returns as `_fly_zem_zev`.
 
-    The engine's error ratio is unknown at the start of the interval, and assumed (second of `feedback`); once
+    The engine's error ratio is unknown at the start of the interval, and assumed (last of `feedback`); once
     a period has been flown it is known from the change of velocity, which is compared with what the command
     should have given.
     """
@@ -131,7 +139,7 @@ def _fly_plan(
     navigation = conditions.navigation_error
     periods = commanded.shape[0] - 1
     planned = reference.acceleration.shape[0]
-    gains, estimate = feedback
+    across, upward, estimate = feedback
     limited = 0
     for number in range(7):
         path[0, number] = start[number]
@@ -140,24 +148,30 @@ def _fly_plan(
         if k >= planned:
             commanded[k] = 0.0
             time[k + 1] = time[k] + fall_freely(path[k], conditions, path[k + 1])
+            keep_state(conditions.turning, k + 1)
             return k + 2, TOUCHDOWN, limited
         if k == periods:
             break
         for axis in range(3):
+            gains = upward if axis == 2 else across
             miss = path[k, axis] + navigation[axis] - reference.position[k, axis]
             drift = path[k, 3 + axis] + navigation[3 + axis] - reference.velocity[k, axis]
             acceleration = reference.acceleration[k, axis]
             acceleration -= gains.position_gain * miss
             acceleration -= gains.velocity_gain * drift
             commanded[k, axis] = path[k, 6] * acceleration / (1.0 + estimate)
+        aim_ahead(conditions.turning, commanded[k], reference.acceleration, k, period)
         if limit_into(commanded[k], vehicle.min_thrust, vehicle.max_thrust, vehicle.pointing_limit):
             limited += 1
         flown, status = hold_period(path[k], commanded[k], conditions, path[k + 1])
+        keep_state(conditions.turning, k + 1)
         time[k + 1] = time[k] + flown
         if status != FLYING:
             return k + 2, status, limited
         sense(sensing, (path[k], path[k + 1], flown, k), gravity, navigation)
-        estimate = _estimate_error(path[k], path[k + 1], commanded[k], period, gravity, estimate)
+        told = _estimate_error(path[k], path[k + 1], commanded[k], period, gravity, estimate)
+        least = _LEAST_TELLING * path[k, 6] * period
+        estimate = feel_engine(conditions.turning, estimate, told, least)
     return periods + 1, FLYING, limited
 
 
@@ -197,7 +211,7 @@ def _name_footing(plain: _PlainFooting | None) -> Footing | None:
 
 @compile_kernel
 def _name_conditions(conditions: _PlainConditions) -> FlightConditions:
-    period, plane, gravity, vehicle, thrust_error, navigation, footing = conditions
+    period, plane, gravity, vehicle, thrust_error, navigation, footing, turning = conditions
     return FlightConditions(
         period,
         plane,
@@ -206,6 +220,7 @@ def _name_conditions(conditions: _PlainConditions) -> FlightConditions:
         thrust_error,
         navigation,
         _name_footing(footing),
+        name_turning(turning),
     )
 
 
@@ -227,14 +242,13 @@ def enter_zem_zev(
 def enter_plan(
     start: Array,
     reference: tuple[Array, Array, Array],
-    feedback: tuple[float, float, float],
+    feedback: tuple[tuple[float, float], tuple[float, float], float],
     conditions: _PlainConditions,
     sensing: PlainSensing | None,
     log: tuple[Array, Array, Array],
 ) -> tuple[int, int, int]:
     """`_fly_plan` of plain tuples."""
     named = _name_conditions(conditions)
-    position_gain, velocity_gain, assumed_error = feedback
-    gains = TrackingGains(position_gain, velocity_gain)
-    law = _Reference(*reference), (gains, assumed_error)
+    across, upward, assumed_error = feedback
+    law = _Reference(*reference), (TrackingGains(*across), TrackingGains(*upward), assumed_error)
     return _fly_plan(start, *law, named, name_sensing(sensing), _Log(*log))

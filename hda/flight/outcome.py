@@ -21,7 +21,7 @@ class Ending(StrEnum):
     SUCCESS = "success"
     """Safe ground, soft touchdown, propellant left."""
     HARD_LANDING = "hard-landing"
-    """Safe ground, but too fast."""
+    """Safe ground, but too fast; of a rigid body also leaning or turning too far."""
     UNSAFE_SITE = "unsafe-site"
     """Landed on a hazard or outside the map."""
     CRASH = "crash"
@@ -34,7 +34,7 @@ class Ending(StrEnum):
 
 ENDINGS: dict[str, str] = {
     Ending.SUCCESS: "landed softly on safe ground",
-    Ending.HARD_LANDING: "reached safe ground, but too fast to be a success",
+    Ending.HARD_LANDING: "reached safe ground, but not gently enough to be a success",
     Ending.UNSAFE_SITE: "touched down on hazardous ground",
     Ending.CRASH: "crashed into the ground",
     Ending.TANK_EMPTY: "ran out of propellant above the ground",

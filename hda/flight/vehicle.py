@@ -5,6 +5,7 @@ pointing limit (`guidance.thrust_limits`), applies it with this interval's relat
 one control period; motion under a held thrust is exact (`guidance.dynamics`). When the time to go falls to
 half a control period the engine is cut off and the vehicle falls freely to the target plane. The flight ends
 where the plane is crossed, whatever the engine does; over true ground, where its pads or its belly touch it.
+A rigid body flies the same thrusts by its attitude loop (`hda.flight.rigid`).
 """
 
 from __future__ import annotations
@@ -16,12 +17,16 @@ import numpy as np
 
 from guidance.arrays import Array
 from guidance.lander import Lander
+from guidance.rigid_body.attitude_loop import DEFAULT_LOOP, AttitudeLoop
+from guidance.rigid_body.body import RigidBody
+from guidance.rigid_body.state import RigidState
 from guidance.state import State
 from guidance.thrust_limits import pointing_angle
 from hda.flight import held_thrust
 from hda.flight.interval import enter_plan, enter_zem_zev, plain_footing
+from hda.flight.rigid.turning import PlainTurning, begin_turning
 from hda.navigation.steering import Sensing, plain_sensing
-from hda.policy import Decision, ZemZevCommand
+from hda.policy import Command, Decision, PlanCommand, ZemZevCommand
 from hda.safety.touchdown_stance import Footing
 
 
@@ -32,10 +37,12 @@ class ControlPeriods:
     Attributes:
         period: [s] over which a thrust is held.
         count: how many.
+        loop: by which a rigid body turns to its thrust, in periods of its own.
     """
 
     period: float
     count: int
+    loop: AttitudeLoop = DEFAULT_LOOP
 
 
 class FlightStatus(IntEnum):
@@ -71,11 +78,14 @@ class FlightErrors:
             the estimate.
         sensing: a filter that goes on estimating during the interval, from the given error on; its memory is
             changed. None: the error stays.
+        tilt: [rad] shape (3,), true minus believed attitude of a rigid body, a small rotation about the
+            site's axes.
     """
 
     thrust: float = 0.0
     navigation: Array = field(default_factory=lambda: np.zeros(6))
     sensing: Sensing | None = None
+    tilt: Array = field(default_factory=lambda: np.zeros(3))
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,11 +95,14 @@ class Segment:
     Attributes:
         time: [s] shape (n,), since the decision.
         path: shape (n, 7): position [m], velocity [m/s], mass [kg].
-        commanded: [N] shape (n - 1, 3), thrust within the vehicle's limits, held over each interval.
+        commanded: [N] shape (n - 1, 3), thrust within the vehicle's limits, held over each interval. What a
+            rigid body gives of it is in its states.
         time_to_go: [s] what remains at the last node.
         thrust_error: relative error of the applied thrust over the whole segment.
         status: where the vehicle is at the last node.
         pointing_limited: control periods in which the pointing limit changed the thrust.
+        body_path: shape (n, 17), states of a rigid body as `guidance.rigid_body.state.SIZE` says; None of a
+            point mass.
     """
 
     time: Array
@@ -99,17 +112,23 @@ class Segment:
     thrust_error: float
     status: FlightStatus
     pointing_limited: int = 0
+    body_path: Array | None = None
 
     @property
     def final_state(self) -> State:
         """State at the last node."""
         return State(self.path[-1, :3], self.path[-1, 3:6], float(self.path[-1, 6]))
 
+    @property
+    def final_body(self) -> RigidState | None:
+        """State of a rigid body at the last node; None of a point mass."""
+        return None if self.body_path is None else RigidState.of_array(self.body_path[-1])
+
 
 def fly_over(
-    state: State,
+    state: State | RigidState,
     decision: Decision,
-    lander: Lander,
+    vehicle: Lander | RigidBody,
     surroundings: Surroundings,
     interval: ControlPeriods,
     errors: FlightErrors,
@@ -117,9 +136,10 @@ def fly_over(
     """Fly a decision until the next look or the ground.
 
     Args:
-        state: where the interval starts, above the ground.
+        state: where the interval starts, above the ground. Without attitude a rigid body stands upright, at
+            rest, its engine off.
         decision: site and command.
-        lander: the vehicle, which limits the thrust.
+        vehicle: a point mass, or a rigid body; it limits the thrust.
         surroundings: gravity, and the true ground if there is one.
         interval: control periods to the next look.
         errors: of the applied thrust and of the estimated state over this interval.
@@ -130,15 +150,17 @@ def fly_over(
     Raises:
         ValueError: a plan was sampled at another control period than the vehicle's.
     """
-    periods = interval.count
+    periods, command = interval.count, decision.command
     time, path, commanded = np.empty(periods + 2), np.empty((periods + 2, 7)), np.empty((periods + 1, 3))
-    plane, vehicle = float(decision.site[2]), _vehicle_limits(lander)
+    plane, limits = float(decision.site[2]), _vehicle_limits(vehicle)
     gravity, ground = surroundings.gravity, surroundings.footing
     footing = None if ground is None else plain_footing(ground)
     sensing = None if errors.sensing is None else plain_sensing(errors.sensing)
     believed = errors.navigation.copy()
-    conditions = (interval.period, plane, gravity, vehicle, errors.thrust, believed, footing)
-    start, log, command = state.as_array(), (time, path, commanded), decision.command
+    turning = _begin_turning(state, vehicle, interval, gravity, errors.tilt, command)
+    conditions = (interval.period, plane, gravity, limits, errors.thrust, believed, footing, turning)
+    point = state.point if isinstance(state, RigidState) else state
+    start, log = point.as_array(), (time, path, commanded)
     if isinstance(command, ZemZevCommand):
         rate = command.time_to_go_rate
         asked = (command.position_gain, command.velocity_gain, command.time_to_go, rate)
@@ -148,8 +170,7 @@ def fly_over(
         reference = command.reference
         _check_period(reference.control_period, interval.period)
         parts = (reference.position, reference.velocity, reference.thrust_acceleration)
-        position_gain, velocity_gain = command.gains
-        feedback = position_gain, velocity_gain, command.assumed_error
+        feedback = command.lateral_gains or command.gains, command.gains, command.assumed_error
         nodes, status, limited = enter_plan(start, parts, feedback, conditions, sensing, log)
         time_to_go = reference.duration - float(time[nodes - 1])
     return Segment(
@@ -160,13 +181,34 @@ def fly_over(
         thrust_error=errors.thrust,
         status=FlightStatus(status),
         pointing_limited=limited,
+        body_path=None if turning is None else turning[4][:nodes],
     )
 
 
-def _vehicle_limits(lander: Lander) -> tuple[float, float, float, float, float]:
+def _begin_turning(
+    state: State | RigidState,
+    vehicle: Lander | RigidBody,
+    interval: ControlPeriods,
+    gravity: Array,
+    tilt: Array,
+    command: Command,
+) -> PlainTurning | None:
+    """The body at the start of an interval; None of a point mass."""
+    if not isinstance(vehicle, RigidBody):
+        return None
+    lead = command.lead if isinstance(command, PlanCommand) else 0.0
+    parts = vehicle.numbers(gravity), interval.loop.numbers, tilt, lead
+    return begin_turning(RigidState.parse(state), *parts, interval.count + 2)
+
+
+def _vehicle_limits(vehicle: Lander | RigidBody) -> tuple[float, float, float, float, float]:
     """`VehicleLimits` without names."""
+    if isinstance(vehicle, RigidBody):
+        lander, limit = vehicle.lander, vehicle.tilt_limit
+    else:
+        lander, limit = vehicle, pointing_angle(vehicle)
     bounds = lander.min_thrust, lander.max_thrust
-    return (*bounds, lander.exhaust_velocity, lander.dry_mass, pointing_angle(lander))
+    return (*bounds, lander.exhaust_velocity, lander.dry_mass, limit)
 
 
 def _check_period(planned: float, flown: float) -> None:

@@ -19,7 +19,7 @@ class AdjustedDescent:
     """As `PlannedDescent`, but a new site may also be reached by a sideways shift of the plan in flight.
 
     Early, the cheaper of the shifted and the fresh plan flies; late, the shifted one wherever it keeps within
-    the thrust and the pointing limit.
+    the thrust and the pointing limit. A rigid body cannot lean at once as a shift asks: it flies fresh plans.
 
     Attributes:
         planned: makes and tracks fresh plans.
@@ -41,7 +41,8 @@ class AdjustedDescent:
         """Shift the plan in flight, replan, or fly on."""
         memory = raise_plan(memory, site)
         remaining, view = memory.reference, memory.view
-        if remaining is None or memory.site is None or np.array_equal(site, memory.site):
+        kept = remaining is None or memory.site is None or np.array_equal(site, memory.site)
+        if remaining is None or kept or view.body is not None:
             return self.planned.command(observation, site, memory)
         shifted = shift_landing_point(remaining, site, view.gravity)
         possible = within_thrust(shifted, view.lander, observation.state.mass, self.reserve)

@@ -253,7 +253,12 @@ class DeferredDecisionPolicy:
         )
 
     def _soft_landing(self, observation: Observation, site: Array, view: ScenarioView) -> SoftLanding | None:
-        """Plan to the first candidate; None where that is out of the planner's range."""
+        """Plan to the first candidate; None where that is out of the planner's range.
+
+        So it is for a rigid body, which cannot follow a trunk of switched thrust: it flies to the best site.
+        """
+        if view.body is not None:
+            return None
         options, state = self.descent.planned.options_for(view), observation.state
         duration = options.terminal_periods * view.control_period
         if state.mass <= view.lander.dry_mass:

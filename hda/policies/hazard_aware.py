@@ -28,6 +28,7 @@ from hda.policies.site_price import (
     price_sites,
     propellant_map,
 )
+from hda.policies.turning_law import reversal_time
 from hda.sensing.gridding import PIXEL_SIZES, ElevationMap, PixelGrid
 from hda.sensing.lidar import Lidar
 from hda.sensing.measured_look import MeasuredGround, assess_elevation
@@ -36,6 +37,7 @@ from hda.task.observation import Observation, ScenarioView
 from hda.task.rules import Rules
 
 _WIDEST_SPREAD = 1.0  # [m] 2.5 of it are the half width over which the price averages
+_TURN_PRICE = 0.5  # [kg] that a change of site costs a body which must turn again, on tuning episodes or more
 _SQUARE = 1.25  # half side of the belief's square in widths of the first look
 
 
@@ -100,6 +102,14 @@ class HazardAwareSite:
 
     weights: HazardAwareWeights = field(default_factory=HazardAwareWeights)
 
+    def weights_for(self, view: ScenarioView) -> HazardAwareWeights:
+        """The weights; a rigid body changes its site for the price of a turn, and no later than it can."""
+        own = self.weights
+        if view.body is None:
+            return own
+        commit_time = max(own.commit_time, reversal_time(view.body))
+        return replace(own, commit_time=commit_time, switch_gain=max(own.switch_gain, _TURN_PRICE))
+
     def begin(self, view: ScenarioView) -> HazardAwareMemory:
         """Nothing seen yet."""
         load_kernels(ranging=isinstance(view.lidar, RangingLidar))
@@ -121,7 +131,8 @@ class HazardAwareSite:
         within: float = math.inf,
     ) -> Array:
         """The same where the probability that each cell is safe, shape (n, n), is known."""
-        next_look = predict_next_look(observation, view, belief.corner, self.weights.commit_time)
+        commit_time = self.weights_for(view).commit_time
+        next_look = predict_next_look(observation, view, belief.corner, commit_time)
         propellant = propellant_map(observation, view, belief)
         spread = landing_spread(observation, self.weights.dispersion)
         return price_sites(safe, propellant, next_look, replace(self.weights, dispersion=spread), within)
@@ -133,12 +144,13 @@ class HazardAwareSite:
         belief = fuse_look(observation, view, memory.belief)
         memory = HazardAwareMemory(view, belief)
         height = float(observation.state.position[2] - observation.target[2])
-        if height <= 0.0 or (not first and observation.time_to_go <= self.weights.commit_time):
+        if height <= 0.0 or (not first and observation.time_to_go <= self.weights_for(view).commit_time):
             return observation.target, memory
-        price = self.price(observation, view, belief, self.weights.switch_gain)
+        gain = self.weights_for(view).switch_gain
+        price = self.price(observation, view, belief, gain)
         best = divmod(int(np.argmin(price)), price.shape[1])
         present = belief.cell(observation.target)
-        if present is not None and price[present] <= price[best] + self.weights.switch_gain:
+        if present is not None and price[present] <= price[best] + gain:
             return observation.target, memory
         return observation.settled(belief.site(*best, float(observation.target[2]))), memory
 

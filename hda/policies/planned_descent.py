@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 import numpy as np
@@ -16,6 +16,7 @@ from guidance.tracking.reference import TrackingReference
 from guidance.tracking.regulator import DEFAULT_WEIGHTS, TrackingWeights, tracking_gains
 from guidance.tracking.retarget import shift_landing_point
 from guidance.tracking.soft_landing import DEFAULT_OPTIONS, SoftLanding, SoftLandingOptions, plan_soft_landing
+from hda.policies.turning_law import TurningLaw
 from hda.policies.zem_zev import FixedGainZemZev
 from hda.policy import Command, DecisionStatus, PlanCommand
 from hda.task.observation import Observation, ScenarioView
@@ -38,7 +39,7 @@ class DescentMemory:
 
 @dataclass(frozen=True)
 class PlannedDescent:
-    """Plan the least-propellant descent at each look and track it.
+    """Plan the least-propellant descent at each look and track it; for a rigid body a smooth one.
 
     If the site is out of reach it flies to the reachable point nearest to it; if the planner gives no answer,
     the last plan flies on; if there is none, ZEM/ZEV flies. Each is labelled in the decision's status.
@@ -50,16 +51,19 @@ class PlannedDescent:
         bears_engine: the thrust margin is at least the bound of the engine's error
             (`guidance.tracking.engine_error`), and an engine that the margin does not cover by far is taken
             for a weak one until it is felt; else the options' margin stays as it is.
+        turning: how a rigid body is flown instead.
     """
 
     options: SoftLandingOptions = DEFAULT_OPTIONS
     weights: TrackingWeights = DEFAULT_WEIGHTS
     commit_time: float = 10.0
     bears_engine: bool = True
+    turning: TurningLaw = field(default_factory=TurningLaw)
 
     def begin(self, view: ScenarioView) -> DescentMemory:
         """No plan yet; the planner is made ready here, so that the first decision does not wait for it."""
-        _load_planner(self.options_for(view), self.weights, view.control_period)
+        if view.body is None:
+            _load_planner(self.options_for(view), self.weights, view.control_period)
         return DescentMemory(view)
 
     def command(
@@ -96,6 +100,11 @@ class PlannedDescent:
         view, state = memory.view, observation.state
         if state.mass <= view.lander.dry_mass:
             return None
+        if view.body is not None:
+            smooth = self.turning.plan(observation, site, view)
+            return SoftLanding(
+                PlanStatus.LIMIT_REACHED if smooth is None else PlanStatus.OPTIMAL, smooth, None
+            )
         duration = self.options.terminal_periods * view.control_period
         if state.position[2] - site[2] <= 0.5 * self.options.terminal_deceleration * duration**2:
             return None
@@ -114,6 +123,8 @@ class PlannedDescent:
 
     def command_of(self, reference: TrackingReference, view: ScenarioView, mass: float) -> PlanCommand:
         """The command that tracks a reference from now on, with a vehicle of `mass` [kg]."""
+        if view.body is not None:
+            return self.turning.command(reference, view.control_period)
         gains = tracking_gains(view.control_period, self.weights)
         if not self.bears_engine:
             return PlanCommand(reference, gains)

@@ -19,6 +19,7 @@ from guidance.kernel import compile_vector_kernel
 from guidance.validation import finite_number
 
 _LINE = 16  # numbers of a cache line
+_NO_LIMIT = 1e9  # tangent
 
 
 @dataclass(frozen=True)
@@ -31,7 +32,7 @@ class Lidar:
         noise: standard deviation of the observed probability at `noise_range`, growing with range.
         noise_range: [m] range to which `noise` refers.
         off_nadir_limit: [rad] pixels further than this from the lander's vertical read 0 (slant angle under
-            70 deg).
+            70 deg). On a rigid body it counts from the body's own axis.
         dropout: probability that a look comes without a map: every pixel reads 0.
     """
 
@@ -132,6 +133,7 @@ def look(
     target: Array,
     probability: NDArray[np.float32],
     noise: NDArray[np.float32],
+    axis: Array | None = None,
 ) -> NDArray[np.float32]:
     """Observe the safety map around `target` (Algorithm 2).
 
@@ -141,6 +143,7 @@ def look(
         target: [m] shape (3,), centre of the field of view, on the target plane.
         probability: shape (rows, columns), V_P of the true map at 1 m a cell; row 0 is the south edge.
         noise: standard normal, shape (pixels, pixels).
+        axis: unit vector, shape (3,), that the limit counts from; straight down if left out.
 
     Returns:
         Shape (pixels, pixels) in [0, 1]; row i grows north, column j east.
@@ -149,7 +152,19 @@ def look(
     sensor = (
         lidar.width(position, target),
         lidar.noise / lidar.noise_range,
-        math.tan(lidar.off_nadir_limit),
+        math.tan(lidar.off_nadir_limit) if axis is None else _NO_LIMIT,
     )
     look_into(position, target, probability, noise, sensor, out)
+    if axis is not None:
+        out[_beyond(lidar, position, target, axis)] = 0.0
     return out
+
+
+def _beyond(lidar: Lidar, position: Array, target: Array, axis: Array) -> NDArray[np.bool_]:
+    """Shape (pixels, pixels): which lie further than the limit from an axis, shape (3,)."""
+    offset = ((np.arange(lidar.pixels) + 0.5) / lidar.pixels - 0.5) * lidar.width(position, target)
+    rays = np.empty((lidar.pixels, lidar.pixels, 3))
+    rays[..., 0] = target[0] - position[0] + offset
+    rays[..., 1] = (target[1] - position[1] + offset)[:, None]
+    rays[..., 2] = target[2] - position[2]
+    return rays @ axis < math.cos(lidar.off_nadir_limit) * np.linalg.norm(rays, axis=2)

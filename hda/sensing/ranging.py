@@ -16,11 +16,13 @@ from numpy.typing import NDArray
 
 from guidance.arrays import Array
 from guidance.kernel import compile_kernel
+from guidance.rigid_body.state import RigidState
 from guidance.state import State
 from guidance.validation import finite_number
 from hda.sensing.gridding import Gridding
 from hda.sensing.ray_casting import find_ground
 from hda.sensing.scan_draws import ScanDraws
+from hda.sensing.sensor_axis import is_outside, sensor_axis
 
 
 @dataclass(frozen=True)
@@ -34,7 +36,9 @@ class RangingLidar:
             (the paper's 11.4 deg).
         margin: [m] by which the scan reaches beyond that square on every side, so that Algorithm 1 can judge
             its edge: half a lander and a cell.
-        off_nadir_limit: [rad] rays further than this from the vertical are not sent (the paper's 20 deg).
+        off_nadir_limit: [rad] rays further than this from the vertical are not sent (the paper's 20 deg). On
+            a rigid body it counts from the body's own axis: the reach of gimbals, or half the field of view
+            of a sensor that is fixed to the body.
         pixels: along each side of the safety map (the paper's 64).
         range_noise: [m] one sigma of a range at `noise_range`, growing in proportion to the range (the
             paper's 5 cm at three sigma; in proportion, as the echo weakens with the square of the range).
@@ -115,7 +119,7 @@ class PointCloud:
 class _View(NamedTuple):
     """Place and velocity at the decision, the scan's centre from there and its width, tangent of the limit.
 
-    `top` is a height [m] that no ground exceeds.
+    `top` is a height [m] that no ground exceeds; the limit counts from the vertical, or from a body's `axis`.
     """
 
     position: Array
@@ -124,6 +128,7 @@ class _View(NamedTuple):
     width: float
     limit: float
     top: float
+    axis: Array | None
 
 
 class _Errors(NamedTuple):
@@ -192,7 +197,7 @@ def _scan_into(
             y = aim_y + age * believed_vy + ((i + 0.5) / rays - 0.5) * view.width
             z = aim_z + age * believed_vz
             across = math.sqrt(x**2 + y**2)
-            if across > -view.limit * z:
+            if is_outside(view.axis, view.limit, (x, y, z), across):
                 continue
             length = math.sqrt(across * across + z**2)
             x, y, z = x / length, y / length, z / length
@@ -223,7 +228,7 @@ def _scan_into(
 def scan(
     lidar: RangingLidar,
     elevation: NDArray[np.float32],
-    state: State,
+    state: State | RigidState,
     target: Array,
     draws: ScanDraws,
     highest: float | None = None,
@@ -235,7 +240,7 @@ def scan(
     Args:
         lidar: the sensor.
         elevation: [m] shape (rows, columns), the true ground at 1 m a cell; row 0 is the south edge.
-        state: true state at the decision, above the target.
+        state: true state at the decision, above the target; a rigid body does not turn during the scan.
         target: [m] shape (3,), where the scan is centred, on the target plane.
         draws: of this scan, for `lidar.rays` rays.
         highest: [m] the greatest known height; found in `elevation` if left out.
@@ -256,6 +261,7 @@ def scan(
             rays * lidar.ray_spacing(state.position, target),
             math.tan(lidar.off_nadir_limit),
             float(np.nanmax(elevation)) if highest is None else highest,
+            sensor_axis(state.attitude) if isinstance(state, RigidState) else None,
         ),
         _Errors(
             lidar.pointing_error * draws.attitude,

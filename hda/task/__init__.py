@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from guidance.exports import lazy_exports
 
 if TYPE_CHECKING:
+    from hda.task.body_variants import BODY_VARIANTS, vary_body
     from hda.task.observation import Observation, ScenarioView
     from hda.task.own_ground import place_preset
     from hda.task.presets import PRESETS, Preset, find_preset
@@ -18,6 +19,10 @@ if TYPE_CHECKING:
     from hda.task.touchdown import GroundTouchdown, PlaneTouchdown
 
 _HOMES = {
+    "hda.task.body_variants": (
+        "BODY_VARIANTS",
+        "vary_body",
+    ),
     "hda.task.observation": (
         "Observation",
         "ScenarioView",
@@ -44,6 +49,7 @@ _HOMES = {
 }
 
 __all__ = [
+    "BODY_VARIANTS",
     "PRESETS",
     "GroundTouchdown",
     "Observation",
@@ -57,6 +63,7 @@ __all__ = [
     "find_preset",
     "place_preset",
     "sample_scenario",
+    "vary_body",
 ]
 
 __getattr__, __dir__ = lazy_exports(

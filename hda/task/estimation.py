@@ -49,6 +49,14 @@ def estimation_error(
     return np.concatenate([place - state.position, navigation.velocity - state.velocity])
 
 
+def attitude_error(scenario: Scenario) -> Array:
+    """[rad] shape (3,), true minus believed attitude, a small rotation about the site's axes.
+
+    It is the tilt that the filter reckons with, one for the episode; none without a filter.
+    """
+    return np.zeros(3) if scenario.sensor_errors is None else scenario.sensor_errors.tilt.copy()
+
+
 def displaced(state: State, error: Array) -> State:
     """The state as the lander estimates it: the true one plus the error, shape (6,)."""
     return State(state.position + error[:3], state.velocity + error[3:], state.mass)

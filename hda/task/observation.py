@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from guidance.arrays import Array
 from guidance.lander import Lander
+from guidance.rigid_body.body import RigidBody
 from guidance.state import State
 from hda.safety.criteria import DEFAULT_CRITERIA, SafetyCriteria
 from hda.safety.touchdown_stance import Stance
@@ -25,12 +26,13 @@ class ScenarioView:
     """What a policy may know of a scenario before the first look; never the true map.
 
     Attributes:
-        lander: the vehicle.
+        lander: the vehicle; of a rigid body the point mass that thrusts no further aside than it leans.
         gravity: [m/s^2] shape (3,).
         nominal_target: [m] shape (3,), the first target, on the target plane.
         rules: timing, bounds of the dispersions, judgement.
         lidar: the sensor, with its known noise.
         criteria: what the lander demands of its ground.
+        body: the vehicle where it is a rigid body; None for a point mass.
     """
 
     lander: Lander
@@ -39,6 +41,7 @@ class ScenarioView:
     rules: Rules
     lidar: Lidar | RangingLidar
     criteria: SafetyCriteria = DEFAULT_CRITERIA
+    body: RigidBody | None = None
 
     @property
     def decision_interval(self) -> float:
@@ -77,6 +80,9 @@ class Observation:
             the flight more than the error of the old.
         covariance: shape (6, 6), of the errors of position less site [m] and of velocity [m/s], as the filter
             states it; None without a filter.
+        attitude: unit quaternion, scalar first, shape (4,), that the lander believes to have: it turns body
+            vectors into the site frame. None for a point mass.
+        rates: [rad/s] shape (3,), body frame; None for a point mass.
     """
 
     index: int
@@ -89,6 +95,8 @@ class Observation:
     ground: MeasuredGround | None = None
     stance: Stance | None = None
     covariance: Array | None = None
+    attitude: Array | None = None
+    rates: Array | None = None
 
     @property
     def has_map(self) -> bool:

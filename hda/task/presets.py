@@ -7,15 +7,19 @@ and errors of the estimated state.
 On `lidar` and `lidar-coarse` a look is no longer the true map with noise on it: ranges are measured to the
 same ground, 128 or 64 rays a side, gridded, and assessed on board; and the flight ends on the real ground.
 `navigated` is `lidar` by a lander that finds its state by sensors and a filter.
+On `rigid-body` that lander must turn to thrust elsewhere, and its sensor turns with it.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 from guidance.constants import MOON_GRAVITY
 from guidance.lander import PAPER_LANDER, Lander
+from guidance.rigid_body.attitude_loop import DEFAULT_LOOP, AttitudeLoop
+from guidance.rigid_body.body import DEFAULT_BODY, RigidBody
+from guidance.thrust_limits import pointing_angle
 from guidance.validation import finite_number, finite_vector, unknown_name
 from hda.ground.own_terrain import OwnTerrain
 from hda.navigation.layout import FilterNumbers
@@ -42,11 +46,15 @@ class Preset:
         start: initial conditions.
         lidar: sensor model.
         rules: timing, dispersions, judgement.
-        lander: the vehicle.
+        lander: the vehicle's engine and tank; without a body it is the vehicle.
         gravity: [m/s^2] site frame, pointing down.
         touchdown: where a flight ends, and how it is judged there.
         navigation: sensors and filter by which the lander knows its state; None: it knows it but for the
             constant errors of `rules`.
+        body: the lander as a rigid body that must turn to thrust elsewhere; None: a point mass. Its engine
+            and tank are those of `lander`, whatever it names, and it leans no further than
+            `lander.pointing_limit`.
+        attitude_loop: by which the body turns.
 
     Raises:
         ValueError: gravity does not point down, a start has no propellant or lies below the target plane,
@@ -64,6 +72,8 @@ class Preset:
     gravity: tuple[float, float, float] = MOON_GRAVITY
     touchdown: Touchdown = field(default_factory=PlaneTouchdown)
     navigation: NavigationSystem | None = None
+    body: RigidBody | None = None
+    attitude_loop: AttitudeLoop = DEFAULT_LOOP
 
     def __post_init__(self) -> None:
         """The ground must be below, and the tank must hold something."""
@@ -78,6 +88,22 @@ class Preset:
             raise ValueError("navigation by a filter leaves no constant navigation errors in the rules")
         if self.navigation is not None:
             _ = self.filter_numbers  # refuses a sensor that no instant can read
+
+    @cached_property
+    def vehicle(self) -> Lander | RigidBody:
+        """What flies: a point mass, or the rigid body with this preset's engine and tank."""
+        if self.body is None:
+            return self.lander
+        limit = min(self.body.tilt_limit, pointing_angle(self.lander))
+        return replace(self.body, lander=self.lander, tilt_limit=limit)
+
+    @cached_property
+    def guided_lander(self) -> Lander:
+        """The point mass that guidance plans for: it thrusts no further aside than a body leans."""
+        vehicle = self.vehicle
+        if not isinstance(vehicle, RigidBody) or vehicle.tilt_limit == pointing_angle(self.lander):
+            return self.lander
+        return replace(self.lander, pointing_limit=vehicle.tilt_limit)
 
     @cached_property
     def filter_numbers(self) -> FilterNumbers | None:
@@ -126,6 +152,14 @@ PRESETS: dict[str, Preset] = {
             lidar=RangingLidar(rays=128),
             touchdown=GroundTouchdown(),
             navigation=NavigationSystem(),
+        ),
+        Preset(
+            name="rigid-body",
+            terrain=PAPER_TERRAIN,
+            lidar=RangingLidar(rays=128),
+            touchdown=GroundTouchdown(),
+            navigation=NavigationSystem(),
+            body=DEFAULT_BODY,
         ),
     )
 }

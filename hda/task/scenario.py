@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from guidance.arrays import Array
+from guidance.rigid_body.body import RigidBody
 from guidance.state import State
 from hda.ground.library import FRESH_SPLIT, Ground, load_tile, tile_numbers
 from hda.ground.tile import Tile
@@ -86,13 +87,15 @@ class Scenario:
 
 def view_of_preset(preset: Preset, nominal_target: Array) -> ScenarioView:
     """What a policy may know of an episode on a preset, with its first target [m], shape (3,)."""
+    vehicle = preset.vehicle
     return ScenarioView(
-        lander=preset.lander,
+        lander=preset.guided_lander,
         gravity=np.array(preset.gravity),
         nominal_target=nominal_target.copy(),
         rules=preset.rules,
         lidar=preset.lidar,
         criteria=preset.criteria,
+        body=vehicle if isinstance(vehicle, RigidBody) else None,
     )
 
 

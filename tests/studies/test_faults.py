@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from hda.navigation import NAVIGATION_FAULTS, add_fault
+from hda.task.body_variants import BODY_VARIANTS, vary_body
 from hda.task.presets import PRESETS
 from studies.campaign import monte_carlo
 from studies.campaign.claimed_folder import FolderError
@@ -23,6 +24,21 @@ def test_every_fault_is_flown_beside_the_preset_as_it_is() -> None:
     for point in points[1:]:
         assert point.study.preset == replace(own, navigation=add_fault(own.navigation, point.label))
         assert replace(point.study, preset=own) == points[0].study
+
+
+def test_on_a_rigid_body_its_variants_are_flown_too() -> None:
+    own = PRESETS["rigid-body"]
+    worlds = fault_presets(own, ("all",))
+    assert list(worlds) == [NO_FAULT, *NAVIGATION_FAULTS, *BODY_VARIANTS]
+    for name in BODY_VARIANTS:
+        assert worlds[name] == vary_body(own, name)
+    assert list(fault_presets(own, ("weak-torque", "plume-noise"))) == [
+        NO_FAULT,
+        "plume-noise",
+        "weak-torque",
+    ]
+    with pytest.raises(ValueError, match="unknown navigation fault"):
+        fault_presets(PRESETS["navigated"], ("weak-torque",))
 
 
 def test_chosen_faults_come_in_their_own_order() -> None:

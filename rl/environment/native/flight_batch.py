@@ -65,9 +65,10 @@ class BatchSettings:
         check_count("num_envs", self.count)
         check_count("threads", self.threads)
         preset = self.preset
-        if not isinstance(preset.lidar, Lidar) or preset.stance is not None or preset.navigation is not None:
+        beyond = preset.stance, preset.navigation, preset.body
+        if not isinstance(preset.lidar, Lidar) or any(part is not None for part in beyond):
             raise ValueError(
-                f"preset must have looks by Algorithm 2, touchdown on the plane and no filter, got"
+                f"preset must have looks by Algorithm 2, touchdown on the plane, no filter and no body, got"
                 f" {preset.name!r}: gymnasium.make_vec(..., vectorization_mode='sync') flies the others"
             )
 

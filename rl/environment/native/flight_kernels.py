@@ -64,7 +64,7 @@ def fly_decisions(first: int, last: int, flights: Flights, vehicle: Vehicle) -> 
         error = draw_symmetric(flights.thrust_seed[k], flights.thrust_bound[k])
         believed, command = flights.navigation_error[k], flights.command[k]
         site = flights.site[k]
-        conditions = (vehicle.period, site[2], vehicle.gravity, vehicle.limits, error, believed, None)
+        conditions = (vehicle.period, site[2], vehicle.gravity, vehicle.limits, error, believed, None, None)
         asked = (command[0], command[1], command[2], command[3])
         nodes, status, limited = enter_zem_zev(flights.state[k], site, asked, conditions, None, log)
         for number in range(7):

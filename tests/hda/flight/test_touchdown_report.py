@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 import hda
 from guidance import PAPER_LANDER, State
+from guidance.rigid_body import RigidState, attitude_along
 from hda.flight.outcome import Contact, Ending, Outcome, classify, score_step
 from hda.flight.touchdown_report import TouchdownFault, TouchdownReport, judge_touchdown
 from hda.ground.tile import Tile, make_tile
@@ -155,6 +156,49 @@ def test_the_published_sets_are_those_of_chandrayaan_3_and_decide():
         TouchdownFault.HORIZONTAL_SPEED,
     )
     assert touch(scenario_on(FLAT, hda.GroundTouchdown(limits=hda.TESTED_LIMITS)), hard).faults == ()
+
+
+def touch_leaning(tilt_deg: float, rate_deg: float, touchdown: hda.GroundTouchdown) -> TouchdownReport:
+    """A rigid body that comes down softly on level ground."""
+    scenario = scenario_on(FLAT, touchdown)
+    assert scenario.footing is not None
+    place, tilt = np.array([*PLACE, contact_height(scenario.footing, *PLACE)]), math.radians(tilt_deg)
+    turned = RigidState(
+        place,
+        np.array(SOFT),
+        1160.0,
+        attitude=attitude_along([math.sin(tilt) * 0.6, math.sin(tilt) * 0.8, math.cos(tilt)], 0.5),
+        rates=math.radians(rate_deg) * np.array([0.6, 0.0, 0.8]),
+    )
+    report = judge_touchdown(scenario, turned.point, place, False, turned)
+    assert report is not None
+    return report
+
+
+@pytest.mark.parametrize(
+    ("tilt_deg", "rate_deg", "faults"),
+    [
+        (5.9, 1.9, ()),
+        (6.1, 1.9, ("tilt",)),
+        (0.0, 2.1, ("turn-rate",)),
+        (9.0, 3.0, ("tilt", "turn-rate")),
+    ],
+)
+def test_a_rigid_body_must_stand_upright_and_still(tilt_deg, rate_deg, faults):
+    report = touch_leaning(tilt_deg, rate_deg, hda.GroundTouchdown())
+    assert math.degrees(report.tilt) == pytest.approx(tilt_deg, abs=1e-6)
+    assert math.degrees(report.turn_rate) == pytest.approx(rate_deg, abs=1e-9)
+    assert report.faults == tuple(TouchdownFault(fault) for fault in faults)
+    outcome = end(scenario_on(FLAT), report)
+    assert outcome.ending is (Ending.HARD_LANDING if faults else Ending.SUCCESS)
+    assert outcome.safe_site
+
+
+def test_what_leans_downhill_tips_over_as_on_a_slope_that_is_steeper_by_as_much():
+    leaning = touch_leaning(5.0, 0.0, hda.GroundTouchdown())
+    steep = touch(scenario_on(incline(5.0)))
+    assert leaning.slope == pytest.approx(0.0, abs=1e-6)
+    assert leaning.tip_over_speed == pytest.approx(steep.tip_over_speed, rel=1e-3)
 
 
 def test_a_fall_above_the_crash_speed_is_a_crash_whatever_the_ground():

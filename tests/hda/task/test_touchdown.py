@@ -11,7 +11,7 @@ from hda.task.presets import PRESETS
 
 def test_only_the_presets_that_measure_their_ground_end_on_it():
     for name, preset in PRESETS.items():
-        on_ground = name in ("lidar", "lidar-coarse", "navigated")
+        on_ground = name in ("lidar", "lidar-coarse", "navigated", "rigid-body")
         assert isinstance(preset.touchdown, hda.GroundTouchdown) == on_ground
         assert (preset.stance is not None) == on_ground
     assert hda.sample_scenario("paper", 0, 0).footing is None

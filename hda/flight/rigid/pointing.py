@@ -1,0 +1,118 @@
+"""Where a rigid body points: along its thrust, ahead of a plan, and upright in time for the touchdown."""
+
+from __future__ import annotations
+
+import math
+
+from guidance.arrays import Array
+from guidance.kernel import compile_kernel
+from guidance.rigid_body.motion import inertia_scale
+from guidance.zem_zev import ZemZevGains
+from hda.flight.rigid.turning import Turning
+
+_RIGHTING_SHARE = 0.6  # of the torque that the body is righted with before the touchdown
+_LEAST_LIFT = 1.0  # [m/s^2] upward, against which a sideways correction is weighed at least
+_STEEPEST = 1.5  # [rad]
+_UPRIGHT_TIME = 2.0  # [s] before the touchdown that a body has arrived by ZEM/ZEV
+_LEAST_TIME = 6.0  # [s] by which its gains are worked out at least
+_LEAST_BURN = 0.3  # [m/s^2] thrust acceleration below which a plan coasts
+
+
+@compile_kernel
+def righting_tilt(turning: Turning, remaining: float) -> float:
+    """[rad] from which the body can be righted, and stopped, in a time: a t^2/4, as of two equal torques.
+
+    Args:
+        turning: the body.
+        remaining: [s].
+    """
+    scale = inertia_scale(turning.state[13], turning.body)
+    first = turning.body.torque_limit[0] / turning.body.inertia[0]
+    second = turning.body.torque_limit[1] / turning.body.inertia[1]
+    return 0.25 * _RIGHTING_SHARE * min(first, second) / scale * max(remaining, 0.0) ** 2
+
+
+@compile_kernel
+def steer_across(
+    turning: Turning | None, seen: Array, site: Array, gains: ZemZevGains, remaining: float, out: Array
+) -> None:
+    """ZEM/ZEV of a body across the vertical: it has arrived before the touchdown, and stands upright there.
+
+    Args:
+        turning: the body; None for a point mass, whose acceleration stays as it is.
+        seen: estimated state, shape (7,).
+        site: [m] shape (3,).
+        gains: K_R and K_V.
+        remaining: [s] to the touchdown.
+        out: [m/s^2] shape (3,), thrust acceleration; its horizontal components are written.
+    """
+    if turning is None:
+        return
+    left = max(remaining - _UPRIGHT_TIME, _LEAST_TIME)
+    for axis in range(2):
+        speed = seen[3 + axis]
+        miss = site[axis] - seen[axis] - speed * left
+        out[axis] = gains.position_gain * miss / (left * left) + gains.velocity_gain * speed / left
+
+
+@compile_kernel
+def aim_along(turning: Turning | None, commanded: Array, remaining: float) -> None:
+    """Lean a body along its thrust, no further than the time to go allows to right it.
+
+    Args:
+        turning: the body; None for a point mass.
+        commanded: [N] shape (3,), site frame; what is too much of it across the vertical is taken away.
+        remaining: [s] to the touchdown.
+    """
+    if turning is None:
+        return
+    _keep_upright(turning, commanded, remaining)
+    for axis in range(3):
+        turning.aim[axis] = commanded[axis]
+
+
+@compile_kernel
+def _keep_upright(turning: Turning, vector: Array, remaining: float) -> None:
+    """Shorten what a vector has across the vertical to the tilt from which the body can still be righted."""
+    limit = min(righting_tilt(turning, remaining), turning.body.tilt_limit)
+    across = math.sqrt(vector[0] ** 2 + vector[1] ** 2)
+    most = math.tan(min(limit, _STEEPEST)) * max(vector[2], turning.state[13] * _LEAST_LIFT)
+    if across > most:
+        vector[0] *= most / across
+        vector[1] *= most / across
+
+
+@compile_kernel
+def aim_ahead(turning: Turning | None, commanded: Array, planned: Array, node: int, period: float) -> None:
+    """Point a body along the thrust that its plan will have by the time that it has turned.
+
+    While the plan coasts the body turns to the burn that follows.
+
+    Args:
+        turning: the body; None for a point mass.
+        commanded: [N] shape (3,), site frame: what plan and feedback ask for now, before any limit. How much
+            of it is upward is the throttle's business.
+        planned: [m/s^2] shape (n, 3), thrust acceleration of the plan in its periods.
+        node: number of the present period.
+        period: [s].
+    """
+    if turning is None:
+        return
+    mass, last = turning.state[13], planned.shape[0] - 1
+    ahead = node + turning.lead / period
+    first = min(int(ahead), last)
+    while first < last and _size(planned[first]) < _LEAST_BURN:
+        first += 1
+    second = min(first + 1, last)
+    share = min(max(ahead - first, 0.0), 1.0)
+    for axis in range(2):
+        then = (1.0 - share) * planned[first, axis] + share * planned[second, axis]
+        turning.aim[axis] = commanded[axis] + mass * (then - planned[node, axis])
+    upward = (1.0 - share) * planned[first, 2] + share * planned[second, 2]
+    turning.aim[2] = mass * max(upward, _LEAST_LIFT)
+    _keep_upright(turning, turning.aim, (planned.shape[0] - node) * period)
+
+
+@compile_kernel
+def _size(vector: Array) -> float:
+    return math.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)

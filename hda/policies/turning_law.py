@@ -1,0 +1,63 @@
+"""How planned guidance flies a lander that must turn: smooth descents, gentle feedback, no late divert."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+from guidance.arrays import Array
+from guidance.rigid_body.body import RigidBody
+from guidance.tracking.reference import TrackingReference
+from guidance.tracking.regulator import TrackingWeights, tracking_gains
+from guidance.tracking.turning_descent import DEFAULT_TURNING, TurningOptions, plan_turning_descent
+from hda.policy import PlanCommand
+from hda.task.observation import Observation, ScenarioView
+
+_REVERSAL = math.radians(6.0)  # of lean, one way and the other, by which a late divert is flown
+
+
+@dataclass(frozen=True)
+class TurningLaw:
+    """Plans and feedback for a rigid body.
+
+    Attributes:
+        options: how descents are planned.
+        upward: weights of the feedback along the vertical, which the throttle answers.
+        across: weights across it, which the body answers some seconds later.
+        lead: [s] by which the body points ahead of its plan: about what its turn takes.
+
+    Raises:
+        ValueError: a field is out of range.
+    """
+
+    options: TurningOptions = DEFAULT_TURNING
+    upward: TrackingWeights = field(default_factory=lambda: TrackingWeights(acceleration=0.1))
+    across: TrackingWeights = field(default_factory=lambda: TrackingWeights(1.0, 0.25, 0.07))
+    lead: float = 1.5
+
+    def plan(self, observation: Observation, site: Array, view: ScenarioView) -> TrackingReference | None:
+        """A smooth descent from the present attitude; None where there is none within the limits."""
+        if view.body is None or observation.attitude is None:
+            return None
+        state, attitude = observation.state, observation.attitude
+        start = state, attitude, site, view.body, view.control_period
+        return plan_turning_descent(*start, self.options, view.gravity)
+
+    def command(self, reference: TrackingReference, period: float) -> PlanCommand:
+        """Track a descent with control periods of `period` [s]."""
+        across, upward = tracking_gains(period, self.across), tracking_gains(period, self.upward)
+        return PlanCommand(reference, upward, lateral_gains=across, lead=self.lead)
+
+
+def reversal_time(body: RigidBody) -> float:
+    """[s] that a late divert takes at least: the body leans one way, the other, and stands upright again.
+
+    A turn by an angle takes 2 sqrt(angle / acceleration) with the torques of two axes.
+
+    Args:
+        body: the vehicle.
+    """
+    about_x, about_y, _ = body.inertia
+    acceleration = min(body.torque_limit[0] / about_x, body.torque_limit[1] / about_y)
+    turns = (_REVERSAL, 2.0 * _REVERSAL, _REVERSAL)
+    return sum(2.0 * math.sqrt(angle / acceleration) for angle in turns)

@@ -1,0 +1,35 @@
+"""The axis that a sensor's field of regard is counted from: the vertical, or that of the body it rides on.
+
+A sensor looks down along the body. On gimbals it turns to its target within a limit about that axis; fixed to
+the body it sees what lies within half its field of view. Both are one cone.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from guidance.arrays import Array
+from guidance.kernel import compile_kernel
+from guidance.rigid_body.quaternion import rotate
+
+
+def sensor_axis(attitude: Array) -> Array:
+    """Unit vector, shape (3,), site frame: down along a body of an attitude, shape (4,)."""
+    return -rotate(attitude, np.array([0.0, 0.0, 1.0]))
+
+
+@compile_kernel
+def is_outside(axis: Array | None, limit: float, ray: tuple[float, float, float], across: float) -> bool:
+    """Whether a ray leaves the cone about the axis.
+
+    Args:
+        axis: unit vector, shape (3,); None: straight down.
+        limit: tangent of the cone's half-angle.
+        ray: direction, of any length.
+        across: horizontal length of the ray.
+    """
+    x, y, z = ray
+    if axis is None:
+        return across > -limit * z
+    along = axis[0] * x + axis[1] * y + axis[2] * z
+    return along <= 0.0 or x * x + y * y + z * z - along * along > (limit * along) ** 2

@@ -1,0 +1,110 @@
+"""Whole flights of a rigid body: in the limit the point mass's, and what the seam shows of it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import hda
+from guidance import Lander
+from guidance.rigid_body import DEFAULT_BODY, AttitudeLoop, RigidBody, rotate
+from hda.flight.episode import begin_flight, observe
+from hda.flight.record import EpisodeRecord
+from hda.task.presets import PRESETS, Preset
+from hda.task.scenario import sample_scenario
+
+AGILE = RigidBody(torque_limit=(1e9, 1e9, 1e9), rate_limit=1e4, tilt_limit=math.pi, engine_lag=0.0)
+"""A body that hardly takes time to turn."""
+
+
+def with_body(preset: Preset, body: RigidBody, frequency: float = 1.5) -> Preset:
+    loop = AttitudeLoop(frequency, period=min(0.1, 0.75 / frequency))
+    return replace(preset, name="with-a-body", body=body, attitude_loop=loop)
+
+
+def farthest(one: EpisodeRecord, other: EpisodeRecord) -> float:
+    """[m] greatest distance of two paths at the control instants that both have."""
+    nodes = min(len(one.path), len(other.path)) - 1
+    return float(np.linalg.norm(one.position[:nodes] - other.position[:nodes], axis=1).max())
+
+
+@pytest.mark.parametrize("policy", ["single-divert", "nearest-safe", "nearest-safe+convex"])
+def test_in_the_limit_its_flights_are_the_point_masss(policy: str):
+    """Within 1 m with 0.01 s of turning, and ten times nearer with a tenth of it (a fifth is asked for)."""
+    scenario = sample_scenario("paper", 21, 1, split="tuning")
+    point = hda.fly(hda.make_policy(policy), scenario)
+    gaps = []
+    for frequency in (150.0, 1500.0):
+        flown = replace(scenario, preset=with_body(scenario.preset, AGILE, frequency))
+        record = hda.fly(hda.make_policy(policy), flown)
+        assert record.outcome.ending is point.outcome.ending
+        assert record.outcome.touchdown_speed == pytest.approx(point.outcome.touchdown_speed, abs=0.02)
+        gaps.append(farthest(point, record))
+    assert gaps[0] < 1.0
+    assert gaps[1] < 0.2 * gaps[0]
+
+
+def test_an_observation_shows_the_attitude_that_the_lander_believes_to_have():
+    scenario = sample_scenario("rigid-body", 21, 0, split="tuning")
+    flight = begin_flight(scenario)
+    seen = observe(scenario, flight)
+    assert seen.attitude is not None
+    assert seen.rates is not None
+    assert scenario.sensor_errors is not None
+    np.testing.assert_array_equal(seen.rates, np.zeros(3))
+    tilt = scenario.sensor_errors.tilt
+    up = np.array([0.0, 0.0, 1.0])
+    np.testing.assert_allclose(rotate(seen.attitude, up), up - np.cross(tilt, up), atol=1e-5)
+    point = sample_scenario("navigated", 21, 0, split="tuning")
+    plain = observe(point, begin_flight(point))
+    assert plain.attitude is None
+    assert plain.rates is None
+
+
+def test_a_record_holds_the_bodys_states_at_the_control_instants():
+    scenario = sample_scenario("paper", 21, 0, split="tuning")
+    flown = replace(scenario, preset=with_body(scenario.preset, DEFAULT_BODY))
+    record = hda.fly(hda.make_policy("single-divert"), flown)
+    for segment in record.segments:
+        assert segment.body_path is not None
+        assert segment.body_path.shape == (len(segment.time), 17)
+        np.testing.assert_array_equal(segment.body_path[:, [0, 1, 2, 3, 4, 5, 13]], segment.path)
+        np.testing.assert_allclose(np.linalg.norm(segment.body_path[:, 6:10], axis=1), 1.0, atol=1e-12)
+    for before, after in zip(record.segments[:-1], record.segments[1:], strict=True):
+        assert before.body_path is not None
+        assert after.body_path is not None
+        np.testing.assert_allclose(before.body_path[-1], after.body_path[0], rtol=1e-15)
+    assert hda.fly(hda.make_policy("single-divert"), scenario).segments[0].body_path is None
+
+
+def test_equal_episodes_are_equal_to_the_byte():
+    scenario = sample_scenario("paper", 21, 0, split="tuning")
+    flown = replace(scenario, preset=with_body(scenario.preset, DEFAULT_BODY))
+    first, again = (hda.fly(hda.make_policy("nearest-safe"), flown).path.tobytes() for _ in range(2))
+    assert first == again
+
+
+def test_engine_and_tank_of_the_body_are_those_of_the_presets_lander():
+    weak = Lander(dry_mass=1160.0, max_thrust=6000.0, pointing_limit=math.radians(20.0))
+    preset = replace(PRESETS["rigid-body"], lander=weak)
+    vehicle = preset.vehicle
+    assert isinstance(vehicle, RigidBody)
+    assert vehicle.lander == weak
+    assert vehicle.tilt_limit == weak.pointing_limit
+    assert preset.guided_lander == weak
+    assert PRESETS["rigid-body"].guided_lander == replace(Lander(), pointing_limit=DEFAULT_BODY.tilt_limit)
+    assert PRESETS["navigated"].vehicle == PRESETS["navigated"].guided_lander == Lander()
+
+
+def test_the_preset_is_navigated_with_a_body():
+    preset = PRESETS["rigid-body"]
+    assert replace(preset, name="navigated", body=None) == PRESETS["navigated"]
+    body = preset.body
+    assert body is not None
+    assert (body.inertia, body.torque_limit) == ((880.0, 880.0, 1040.0), (66.0, 66.0, 66.0))
+    assert math.degrees(body.rate_limit) == pytest.approx(10.0)
+    assert math.degrees(body.tilt_limit) == pytest.approx(45.0)
+    assert body.engine_lag == 0.2
