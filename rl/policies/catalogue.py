@@ -21,6 +21,7 @@ _AGENTS = {
     "td3-belief": "sees the belief that all looks have left in place of the last one",
     "ppo": "the same agent trained by proximal policy optimisation",
     "recurrent-ppo": "the same with memory: an LSTM of what was seen",
+    "ppo-thrust": "gives the thrust itself, without a guidance law; the lander tracks what it foretells",
     "td3-paper": "the plain recipe: the printed observation vector, TD3 as its authors published it",
 }
 
@@ -61,6 +62,7 @@ _ENTRIES = (
     ("td3-belief", _agent("td3-belief")),
     ("ppo", _agent("ppo")),
     ("recurrent-ppo", _agent("recurrent-ppo")),
+    ("ppo-thrust", _agent("ppo-thrust")),
     *(
         (weights_name(agent, "partial"), _agent(agent, "partial"))
         for agent in ("td3", "td3-lstm", "td3-lstm-plus", "td3-belief")

@@ -5,6 +5,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
@@ -109,7 +110,7 @@ def test_fixed_gain_takes_the_agents_sites_and_nothing_else(weights):
     policy = ComposedPolicy("fixed", AgentSite(weights), FixedGainZemZev())
     record = fly(policy, scenario)
     for observation, decision in zip(record.observations, record.decisions, strict=True):
-        actor = load_actor(weights)
+        actor: Any = load_actor(weights)
         site = actor.decide(observation, actor.begin(scenario.view))[0].site
         np.testing.assert_array_equal(decision.site, site)
         assert isinstance(decision.command, ZemZevCommand)
