@@ -3,7 +3,7 @@
 python -m rl.train autoencoder                        # the map encoder that every agent needs
 python -m rl.train td3 --seed 0 --out runs/td3-0      # an agent; also sac, td3-convex, td3-belief, ..
 python -m rl.train td3-lstm --seed 0 --out runs/m-0   # an agent with memory; also td3-lstm-plus
-python -m rl.train ppo --seed 0 --out runs/ppo-0      # many environments at a time; also recurrent-ppo, ppo-thrust
+python -m rl.train ppo --seed 0 --out runs/ppo-0      # in many at a time; also recurrent-ppo, ppo-thrust
 python -m rl.train td3 --seed 0 --out runs/td3-0 --resume
 python -m rl.train export --name td3 --runs runs/td3-0 runs/td3-1 runs/td3-2
 
