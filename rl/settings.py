@@ -211,6 +211,15 @@ RECURRENT_RECIPES = {
 }
 
 
+CONVEX_SETTINGS = replace(
+    TD3_SETTINGS,
+    guidance="convex",
+    learning_rate_decay=(90_000, 140_000),
+    control_prior_weight=0.0,
+    random_steps=10_000,
+)
+
+
 OFF_POLICY_RECIPES: dict[str, OffPolicyAgentSettings] = {
     "td3": TD3_SETTINGS,
     "sac": SAC_SETTINGS,
@@ -218,13 +227,8 @@ OFF_POLICY_RECIPES: dict[str, OffPolicyAgentSettings] = {
     "tqc": replace(SAC_SETTINGS, algorithm="tqc"),
     **RECURRENT_RECIPES,
     "td3-belief": replace(TD3_SETTINGS, sight="belief"),
-    "td3-convex": replace(
-        TD3_SETTINGS,
-        guidance="convex",
-        learning_rate_decay=(90_000, 140_000),
-        control_prior_weight=0.0,
-        random_steps=10_000,
-    ),
+    "td3-convex": CONVEX_SETTINGS,
+    "td3-belief-convex": replace(CONVEX_SETTINGS, sight="belief"),
     "td3-paper": replace(
         TD3_SETTINGS,
         layout=PRINTED.name,

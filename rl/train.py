@@ -119,7 +119,7 @@ def _named(name: str, kind: type[TrainingOptions], **options: Any) -> Any:
     return Annotated[kind, tyro.conf.subcommand(name, default=kind(**options))]
 
 
-_STEPS = {"td3-convex": 150_000}
+_STEPS = {"td3-convex": 150_000, "td3-belief-convex": 150_000}
 _AGENTS = [
     *(
         _named(name, TrainAgent, settings=recipe, steps=_STEPS.get(name, TrainAgent.steps))

@@ -85,7 +85,7 @@ def test_the_agent_in_the_environment_equals_the_agent_in_fly(weights, episode):
 
 
 @pytest.mark.parametrize("preset", ["paper", "partial", "navigated"])
-@pytest.mark.parametrize("name", ["td3-convex", "td3-belief"])
+@pytest.mark.parametrize("name", ["td3-convex", "td3-belief", "td3-belief-convex"])
 def test_an_agent_of_another_sight_or_guidance_flies_in_the_environment_as_in_fly(name, preset, tmp_path):
     recipe = replace(RECIPES[name], hidden=(16,))
     env = LunarHDAEnv(preset, sight=recipe.sight, guidance=recipe.guidance)
