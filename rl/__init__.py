@@ -1,8 +1,9 @@
 """Learning agents: Gymnasium environments, training, shipped weights, and the agents as policies.
 
-Importing this package registers the environments `LunarHDA-v0`, `LunarHDA-Map-v0` (the raw map),
-`LunarHDA-Site-v0` (the site alone is the action) and `LunarHDA-Belief-v0` (what all looks have left is seen)
-with Gymnasium and the agents with `hda.registry`. Nothing of torch is imported until something is trained.
+Importing this package registers the environments with Gymnasium and the agents with `hda.registry`:
+`LunarHDA-v0`, and with one thing changed each `LunarHDA-Map-v0` (the raw map is seen), `LunarHDA-Belief-v0`
+(what all looks have left is seen), `LunarHDA-Site-v0` (the site alone is the action) and
+`LunarHDA-Thrust-v0` (the thrust is the action). Nothing of torch is imported until something is trained.
 Where nothing has imported it, such as in a worker process, `gymnasium.make("rl:LunarHDA-v0")` does.
 """
 
@@ -59,6 +60,13 @@ gymnasium.register(
     entry_point="rl.environment.map_env:LunarHDAMapEnv",
     vector_entry_point=f"{_NATIVE}:LunarHDAMapVectorEnv",
     **_SPECIFICATION,
+)
+gymnasium.register(
+    "LunarHDA-Thrust-v0",
+    entry_point="rl.environment.thrust.thrust_env:LunarHDAThrustEnv",
+    vector_entry_point="rl.environment.thrust.thrust_vector_env:LunarHDAThrustVectorEnv",
+    reward_threshold=_SPECIFICATION["reward_threshold"],
+    max_episode_steps=200,
 )
 for _name, _options in (("Site", {"guidance": "convex"}), ("Belief", {"sight": "belief"})):
     gymnasium.register(

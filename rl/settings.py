@@ -79,8 +79,8 @@ class AgentSettings:
         matmul_precision: "highest" is float32; "medium" lets the processor multiply in bfloat16 where it can.
         shift: the target moves by at most this share of the look's width in one decision.
         sight: what it sees beside the flight: the last look, or the belief that all looks have left.
-        guidance: what flies to the site: ZEM/ZEV with gains and clock of the agent's own, or convex guidance;
-            then the site alone is the action.
+        guidance: what flies to the site: ZEM/ZEV with gains and clock of the agent's own; or convex guidance,
+            where the site alone is the action; or nothing, where the thrust is the action.
     """
 
     algorithm: AlgorithmName = "td3"
@@ -93,7 +93,7 @@ class AgentSettings:
     matmul_precision: Literal["highest", "high", "medium"] = "medium"
     shift: float = 0.25
     sight: Literal["look", "belief"] = "look"
-    guidance: Literal["zem-zev", "convex"] = "zem-zev"
+    guidance: Literal["zem-zev", "convex", "thrust"] = "zem-zev"
 
     @property
     def action_ranges(self) -> ActionRanges:
@@ -183,6 +183,9 @@ class RecurrentOnPolicySettings(OnPolicySettings):
     memory: int = 128
 
 
+PPO_SETTINGS = OnPolicySettings()
+
+
 RECURRENT_PPO_SETTINGS = RecurrentOnPolicySettings()
 
 
@@ -208,6 +211,15 @@ RECURRENT_RECIPES = {
 }
 
 
+CONVEX_SETTINGS = replace(
+    TD3_SETTINGS,
+    guidance="convex",
+    learning_rate_decay=(90_000, 140_000),
+    control_prior_weight=0.0,
+    random_steps=10_000,
+)
+
+
 OFF_POLICY_RECIPES: dict[str, OffPolicyAgentSettings] = {
     "td3": TD3_SETTINGS,
     "sac": SAC_SETTINGS,
@@ -215,13 +227,8 @@ OFF_POLICY_RECIPES: dict[str, OffPolicyAgentSettings] = {
     "tqc": replace(SAC_SETTINGS, algorithm="tqc"),
     **RECURRENT_RECIPES,
     "td3-belief": replace(TD3_SETTINGS, sight="belief"),
-    "td3-convex": replace(
-        TD3_SETTINGS,
-        guidance="convex",
-        learning_rate_decay=(90_000, 140_000),
-        control_prior_weight=0.0,
-        random_steps=10_000,
-    ),
+    "td3-convex": CONVEX_SETTINGS,
+    "td3-belief-convex": replace(CONVEX_SETTINGS, sight="belief"),
     "td3-paper": replace(
         TD3_SETTINGS,
         layout=PRINTED.name,
@@ -234,8 +241,18 @@ OFF_POLICY_RECIPES: dict[str, OffPolicyAgentSettings] = {
 paper gives none; the others start from what measurement found."""
 
 ON_POLICY_RECIPES: dict[str, OnPolicySettings] = {
-    "ppo": OnPolicySettings(),
+    "ppo": PPO_SETTINGS,
     "recurrent-ppo": RECURRENT_PPO_SETTINGS,
+    "ppo-thrust": replace(
+        PPO_SETTINGS,
+        guidance="thrust",
+        learning_rate=5e-4,
+        learning_rate_decay=(0, 4_000_000),
+        horizon=128,
+        batch_size=1024,
+        discount=0.998,
+        trace=0.98,
+    ),
 }
 
 RECIPES: dict[str, AgentSettings] = {**OFF_POLICY_RECIPES, **ON_POLICY_RECIPES}

@@ -1,9 +1,9 @@
 """Training at the command line. Each command explains its options with --help.
 
 python -m rl.train autoencoder                        # the map encoder that every agent needs
-python -m rl.train td3 --seed 0 --out runs/td3-0      # an agent; also sac, ddpg, tqc, td3-paper
+python -m rl.train td3 --seed 0 --out runs/td3-0      # an agent; also sac, td3-convex, td3-belief, ..
 python -m rl.train td3-lstm --seed 0 --out runs/m-0   # an agent with memory; also td3-lstm-plus
-python -m rl.train ppo --seed 0 --out runs/ppo-0      # many environments at a time; also recurrent-ppo
+python -m rl.train ppo --seed 0 --out runs/ppo-0      # in many at a time; also recurrent-ppo, ppo-thrust
 python -m rl.train td3 --seed 0 --out runs/td3-0 --resume
 python -m rl.train export --name td3 --runs runs/td3-0 runs/td3-1 runs/td3-2
 
@@ -119,7 +119,7 @@ def _named(name: str, kind: type[TrainingOptions], **options: Any) -> Any:
     return Annotated[kind, tyro.conf.subcommand(name, default=kind(**options))]
 
 
-_STEPS = {"td3-convex": 150_000}
+_STEPS = {"td3-convex": 150_000, "td3-belief-convex": 150_000}
 _AGENTS = [
     *(
         _named(name, TrainAgent, settings=recipe, steps=_STEPS.get(name, TrainAgent.steps))
@@ -129,6 +129,7 @@ _AGENTS = [
     _named("td3-lstm", TrainRecurrentAgent),
     _named("td3-lstm-plus", TrainRecurrentAgent, settings=RECURRENT_RECIPES["td3-lstm-plus"], steps=170_000),
     _named("ppo", TrainOnPolicyAgent),
+    _named("ppo-thrust", TrainOnPolicyAgent, settings=ON_POLICY_RECIPES["ppo-thrust"], steps=4_000_000),
     _named("recurrent-ppo", TrainRecurrentOnPolicyAgent),
 ]
 Command = Union[

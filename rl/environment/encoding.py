@@ -207,10 +207,14 @@ def encode_flight(layout: Layout, observation: Observation, nominal_target: Arra
         observation: what was seen.
         nominal_target: [m] shape (3,), first target of the episode.
     """
+    return encode_flights(layout, seen_flight(observation), nominal_target)
+
+
+def seen_flight(observation: Observation) -> SeenFlight:
+    """All of an observation but its map."""
     state = observation.state
     mass, width, clock = np.array([[state.mass], [observation.width], [observation.time_to_go]])
-    seen = SeenFlight(state.position, state.velocity, mass, width, clock, observation.target)
-    return encode_flights(layout, seen, nominal_target)
+    return SeenFlight(state.position, state.velocity, mass, width, clock, observation.target)
 
 
 def encode_observation(

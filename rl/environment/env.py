@@ -112,7 +112,7 @@ class LandingEnv(gymnasium.Env[ObsType, Array32], Generic[ObsType]):
         self.layout: Layout = LAYOUTS[layout]
         self.action_ranges = action_ranges
         self.render_mode = render_mode
-        self.action_space = spaces.Box(-1.0, 1.0, (self.steering.size,), np.float32)
+        self.action_space = spaces.Box(-1.0, 1.0, (self.action_size,), np.float32)
         self.observation_space = self.make_observation_space(setting)
         self.study_seed: int | None = None
         self.next_episode = 0
@@ -126,6 +126,11 @@ class LandingEnv(gymnasium.Env[ObsType, Array32], Generic[ObsType]):
     def steering(self) -> Steering:
         """What an action becomes: ZEM/ZEV with the agent's gains."""
         return GainSteering(self.action_ranges)
+
+    @property
+    def action_size(self) -> int:
+        """Numbers in an action."""
+        return self.steering.size
 
     @abstractmethod
     def make_observation_space(self, preset: Preset) -> spaces.Space[ObsType]:

@@ -12,73 +12,10 @@ import numpy as np
 from guidance.arrays import Array
 from hda.policy import Decision
 from hda.task.observation import Observation, ScenarioView
-from hda.task.rules import Range
-from rl.environment.action import ActionRanges
-from rl.environment.encoding import ENCODING_VERSION, LAYOUTS
-from rl.environment.sight import Sight, make_sight
-from rl.environment.steering import Steering, make_steering
-from rl.inference.arrays import Array32
-from rl.inference.artefacts import WEIGHTS_FOLDER, Artefact, ArtefactError, load_artefact, require
-from rl.inference.latent import encoder_of_card, load_encoder
+from rl.inference.artefacts import WEIGHTS_FOLDER, Artefact, load_artefact
 from rl.inference.networks import Perceptron
-from rl.settings import ON_POLICY_ALGORITHMS
-
-
-def bound_action(inputs: Array32, algorithm: str) -> Array32:
-    """The action in [-1, 1] that an actor's last layer means: of proximal policies the mean, else its tanh.
-
-    Args:
-        inputs: shape (a,), of the last layer.
-        algorithm: that it was trained by.
-    """
-    return np.clip(inputs, -1.0, 1.0) if algorithm in ON_POLICY_ALGORITHMS else np.tanh(inputs)
-
-
-@dataclass(frozen=True)
-class ActorDesign:
-    """What an actor's card says of it, but its weights.
-
-    Attributes:
-        sight: what it sees.
-        steering: what its actions become.
-        hidden: sizes of its hidden layers.
-        algorithm: that it was trained by, which says how its actions are bounded.
-    """
-
-    sight: Sight
-    steering: Steering
-    hidden: tuple[int, ...]
-    algorithm: str
-
-    @classmethod
-    def from_card(cls, card: dict[str, Any], path: Path) -> ActorDesign:
-        """Read it; `path` is named in messages.
-
-        Raises:
-            ArtefactError: it was made for another encoding or another autoencoder, or a field is wrong.
-        """
-        require(card, "encoding_version", ENCODING_VERSION, path)
-        if not isinstance(card.get("layout"), str) or card["layout"] not in LAYOUTS:
-            raise ArtefactError(f"{path}: unknown layout {card.get('layout')!r}")
-        encoder = load_encoder(encoder_of_card(card, path))
-        try:
-            hidden = tuple(int(size) for size in card["hidden"])
-            ranges = action_ranges_from_card(card["action_ranges"])
-            sight = make_sight(card.get("sight", "look"), LAYOUTS[card["layout"]], encoder)
-            steering = make_steering(card.get("guidance", "zem-zev"), ranges)
-        except (KeyError, TypeError, ValueError) as error:
-            fields = "'hidden', 'action_ranges', 'sight' or 'guidance'"
-            raise ArtefactError(f"{path}: the card's {fields} is wrong: {error}") from error
-        return cls(sight, steering, hidden, str(card.get("algorithm")))
-
-    @property
-    def seen(self) -> int:
-        """Numbers in what it sees."""
-        return self.sight.bounds[0].size
-
-    def begin(self, view: ScenarioView) -> tuple[Any, Any]:
-        """Memory of sight and steering before the first look."""
-        return self.sight.begin(view), self.steering.begin(view)
+from rl.policies.actor_design import THRUST, ActorDesign, bound_action
+from rl.policies.thrust_actor import ThrustActor, thrust_actor_from_tensors
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,25 +44,21 @@ class Actor:
         return decision, (seen, steered)
 
 
-def actor_from_artefact(artefact: Artefact, path: Path) -> Actor:
+def actor_from_artefact(artefact: Artefact, path: Path) -> Actor | ThrustActor:
     """Make an actor from verified weights.
 
     Raises:
         ArtefactError: they were made for another encoding, another autoencoder, or have other shapes.
     """
     design = ActorDesign.from_card(artefact.card, path)
+    if design.guidance == THRUST:
+        return thrust_actor_from_tensors(artefact.tensors, design)
     sizes = (design.seen, *design.hidden, design.steering.size)
     return Actor(design, Perceptron.from_tensors(artefact.tensors, sizes))
 
 
-def action_ranges_from_card(card: dict[str, object]) -> ActionRanges:
-    """Undo `dataclasses.asdict` on ActionRanges."""
-    values = {name: Range(**value) if isinstance(value, dict) else value for name, value in card.items()}
-    return ActionRanges(**values)  # type: ignore[arg-type]
-
-
 @cache
-def load_actor(path: Path) -> Actor:
+def load_actor(path: Path) -> Actor | ThrustActor:
     """Read, verify and make an actor; once per process.
 
     Raises:
@@ -146,7 +79,7 @@ class AgentPolicy:
     name: str
     weights: Path
 
-    def begin(self, scenario_view: ScenarioView, rng: np.random.Generator) -> tuple[Any, Any]:
+    def begin(self, scenario_view: ScenarioView, rng: np.random.Generator) -> Any:
         """Read the weights; memory of sight and steering.
 
         Raises:
@@ -154,7 +87,7 @@ class AgentPolicy:
         """
         return load_actor(self.weights).begin(scenario_view)
 
-    def decide(self, observation: Observation, memory: tuple[Any, Any]) -> tuple[Decision, tuple[Any, Any]]:
+    def decide(self, observation: Observation, memory: Any) -> tuple[Decision, Any]:
         """Decide from this observation, and what sight and steering remember."""
         return load_actor(self.weights).decide(observation, memory)
 
@@ -169,13 +102,13 @@ class ActorPolicy:
     """
 
     name: str
-    actor: Actor = field(repr=False)
+    actor: Actor | ThrustActor = field(repr=False)
 
-    def begin(self, scenario_view: ScenarioView, rng: np.random.Generator) -> tuple[Any, Any]:
+    def begin(self, scenario_view: ScenarioView, rng: np.random.Generator) -> Any:
         """Memory of sight and steering."""
         return self.actor.begin(scenario_view)
 
-    def decide(self, observation: Observation, memory: tuple[Any, Any]) -> tuple[Decision, tuple[Any, Any]]:
+    def decide(self, observation: Observation, memory: Any) -> tuple[Decision, Any]:
         """Decide from this observation, and what sight and steering remember."""
         return self.actor.decide(observation, memory)
 
@@ -192,7 +125,7 @@ class AgentSite:
 
     weights: Path
 
-    def begin(self, view: ScenarioView) -> tuple[Any, Any]:
+    def begin(self, view: ScenarioView) -> Any:
         """Read the weights; memory of sight and steering.
 
         Raises:
@@ -200,7 +133,7 @@ class AgentSite:
         """
         return load_actor(self.weights).begin(view)
 
-    def select(self, observation: Observation, memory: tuple[Any, Any]) -> tuple[Array, tuple[Any, Any]]:
+    def select(self, observation: Observation, memory: Any) -> tuple[Array, Any]:
         """Site of the agent's decision."""
         decision, memory = load_actor(self.weights).decide(observation, memory)
         return decision.site, memory

@@ -19,8 +19,10 @@ _AGENTS = {
     "td3-lstm-plus": "the same with one masked memory, the last reward in the history, an encoder per role",
     "td3-convex": "moves the target alone; convex guidance flies to it, as in its training",
     "td3-belief": "sees the belief that all looks have left in place of the last one",
+    "td3-belief-convex": "sees the belief, moves the target alone; convex guidance flies to it",
     "ppo": "the same agent trained by proximal policy optimisation",
     "recurrent-ppo": "the same with memory: an LSTM of what was seen",
+    "ppo-thrust": "gives the thrust itself, without a guidance law; the lander tracks what it foretells",
     "td3-paper": "the plain recipe: the printed observation vector, TD3 as its authors published it",
 }
 
@@ -59,11 +61,13 @@ _ENTRIES = (
     ("td3-paper", _agent("td3-paper")),
     ("td3-convex", _agent("td3-convex")),
     ("td3-belief", _agent("td3-belief")),
+    ("td3-belief-convex", _agent("td3-belief-convex")),
     ("ppo", _agent("ppo")),
     ("recurrent-ppo", _agent("recurrent-ppo")),
+    ("ppo-thrust", _agent("ppo-thrust")),
     *(
         (weights_name(agent, "partial"), _agent(agent, "partial"))
-        for agent in ("td3", "td3-lstm", "td3-lstm-plus", "td3-belief")
+        for agent in ("td3", "td3-lstm", "td3-lstm-plus", "td3-belief", "td3-belief-convex")
     ),
     (weights_name("td3", "lidar"), _agent("td3", "lidar")),
 )

@@ -15,7 +15,7 @@ from hda.task.observation import Observation, ScenarioView
 from rl.inference.arrays import Array32
 from rl.inference.artefacts import Artefact, ArtefactError, load_artefact
 from rl.inference.recurrent_network import RecurrentNetwork, RecurrentSizes
-from rl.policies.actor import ActorDesign, bound_action
+from rl.policies.actor_design import ActorDesign, bound_action
 from rl.settings import ON_POLICY_ALGORITHMS, WITH_MEMORY
 
 _HISTORY = {"td3-lstm": ("action",), "td3-lstm-plus": ("action", "reward"), "recurrent-ppo": ()}

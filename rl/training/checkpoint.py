@@ -26,10 +26,10 @@ if TYPE_CHECKING:
     from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
     from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 
-    from rl.environment.env import LunarHDAEnv
+    from rl.environment.env import LandingEnv
 
     Algorithm = OffPolicyAlgorithm | OnPolicyAlgorithm | RecurrentTD3
-    Environment = LunarHDAEnv | LandingVectorEnv[Any]
+    Environment = LandingEnv[Any] | LandingVectorEnv[Any]
 
 KIND = "checkpoint"
 _REPLAY = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")

@@ -88,10 +88,10 @@ def run_export(options: ExportWeights) -> None:
     finite_number("workers", options.workers, at_least=1)
     console = Console()
     cards = [read_run(run) for run in options.runs]
-    first = cards[0]
-    if any((card["settings"], card["preset"]) != (first["settings"], first["preset"]) for card in cards):
+    first, asked = cards[0], [(settings_from_json(card["settings"]), card["preset"]) for card in cards]
+    if any(each != asked[0] for each in asked):
         raise ValueError("runs must have the same settings and preset")
-    settings, preset = settings_from_json(first["settings"]), find_preset(first["preset"])
+    settings, preset = asked[0][0], find_preset(first["preset"])
     for split in ("tuning", "validation"):
         prepare_tiles(Ground(preset.terrain, preset.criteria), split)
     best = []

@@ -13,8 +13,9 @@ from rich.progress import Progress
 from stable_baselines3.common.callbacks import BaseCallback
 
 from hda.task.presets import Preset
-from rl.environment.env import LunarHDAEnv
-from rl.environment.native.vector_env import LunarHDAVectorEnv
+from rl.environment.env import LandingEnv
+from rl.environment.native.vector_env import LandingVectorEnv
+from rl.inference.arrays import Array32
 from rl.inference.artefacts import save_artefact
 from rl.settings import AgentSettings, OnPolicySettings
 from rl.training.actor_export import actor_card, actor_tensors, policy_of
@@ -40,7 +41,7 @@ class Recorder(BaseCallback):
         folder: Path,
         plan: TrainingPlan,
         settings: AgentSettings,
-        env: LunarHDAEnv | LunarHDAVectorEnv,
+        env: LandingEnv[Array32] | LandingVectorEnv[Array32],
         progress: Progress,
     ) -> None:
         """Start empty; `restore` continues from a checkpoint's card."""

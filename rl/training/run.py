@@ -10,12 +10,15 @@ from typing import Any
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from hda.task.presets import Preset
-from rl.environment.env import LunarHDAEnv
-from rl.environment.native.vector_env import LunarHDAVectorEnv
+from rl.environment.env import LandingEnv, LunarHDAEnv
+from rl.environment.native.vector_env import LandingVectorEnv, LunarHDAVectorEnv
+from rl.environment.thrust.thrust_env import LunarHDAThrustEnv
+from rl.environment.thrust.thrust_vector_env import LunarHDAThrustVectorEnv
+from rl.inference.arrays import Array32
 from rl.inference.artefacts import library_versions
 from rl.learning.algorithms import make_algorithm
 from rl.learning.precision import matmul_precision
-from rl.settings import AgentSettings, OnPolicySettings, settings_from_json
+from rl.settings import WITH_MEMORY, AgentSettings, OnPolicySettings, settings_from_json
 from rl.training.actor_export import actor_card
 from rl.training.checkpoint import newest_checkpoint, restore_checkpoint
 from rl.training.run_folder import TrainingPlan, read_run
@@ -49,9 +52,9 @@ def _train(folder: Path, preset: Preset, settings: AgentSettings, plan: Training
     from rl.training.recorder import Recorder
     from rl.training.vector_adapter import StableBaselinesVector
 
+    env = make_environment(settings, preset)  # refuses what cannot be learnt before a folder is made
     checkpoint = _open_folder(folder, preset, settings, plan, resume)
-    env = make_environment(settings, preset)
-    flown = env if isinstance(env, LunarHDAEnv) else StableBaselinesVector(env)
+    flown = env if isinstance(env, LandingEnv) else StableBaselinesVector(env)
     algorithm = make_algorithm(settings, flown, plan.seed)
     algorithm.set_logger(Logger(str(folder), [TensorBoardOutputFormat(str(folder / "tensorboard"))]))
     columns = (
@@ -75,14 +78,23 @@ def _train(folder: Path, preset: Preset, settings: AgentSettings, plan: Training
     algorithm.logger.close()
 
 
-def make_environment(settings: AgentSettings, preset: Preset) -> LunarHDAEnv | LunarHDAVectorEnv:
+def make_environment(
+    settings: AgentSettings, preset: Preset
+) -> LandingEnv[Array32] | LandingVectorEnv[Array32]:
     """What an agent learns in: one environment, or all in one batch for what learns from many at a time.
 
     Raises:
-        ValueError: a batch does not serve the preset.
+        ValueError: a batch does not serve the preset, or the settings do not go together.
     """
     options: dict[str, Any] = {"layout": settings.layout, "action_ranges": settings.action_ranges}
-    options |= {"encoder": settings.encoder, "sight": settings.sight, "guidance": settings.guidance}
+    options["encoder"] = settings.encoder
+    if settings.guidance == "thrust":
+        if settings.sight != "look" or settings.algorithm in WITH_MEMORY:
+            raise ValueError("guidance thrust goes with sight look, and with an agent without memory")
+        if isinstance(settings, OnPolicySettings):
+            return LunarHDAThrustVectorEnv(settings.environments, preset=preset, **options)
+        return LunarHDAThrustEnv(preset, **options)
+    options |= {"sight": settings.sight, "guidance": settings.guidance}
     if isinstance(settings, OnPolicySettings):
         return LunarHDAVectorEnv(settings.environments, preset=preset, **options)
     return LunarHDAEnv(preset, **options)

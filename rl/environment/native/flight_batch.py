@@ -41,6 +41,16 @@ def check_count(name: str, value: object) -> None:
         raise ValueError(f"{name} must be a whole number of at least 1, got {value!r}")
 
 
+def refuse_unserved(preset: Preset) -> None:
+    """Raise ValueError where the kernels cannot fly a preset."""
+    beyond = preset.stance, preset.navigation, preset.body
+    if not isinstance(preset.lidar, Lidar) or any(part is not None for part in beyond):
+        raise ValueError(
+            f"preset must have looks by Algorithm 2, touchdown on the plane, no filter and no body, got"
+            f" {preset.name!r}: gymnasium.make_vec(..., vectorization_mode='sync') flies the others"
+        )
+
+
 @dataclass(frozen=True)
 class BatchSettings:
     """What the episodes of a batch share.
@@ -64,13 +74,7 @@ class BatchSettings:
         """Refuse what the kernels cannot fly."""
         check_count("num_envs", self.count)
         check_count("threads", self.threads)
-        preset = self.preset
-        beyond = preset.stance, preset.navigation, preset.body
-        if not isinstance(preset.lidar, Lidar) or any(part is not None for part in beyond):
-            raise ValueError(
-                f"preset must have looks by Algorithm 2, touchdown on the plane, no filter and no body, got"
-                f" {preset.name!r}: gymnasium.make_vec(..., vectorization_mode='sync') flies the others"
-            )
+        refuse_unserved(self.preset)
 
 
 class FlightBatch:
@@ -92,6 +96,9 @@ class FlightBatch:
         timed_out: shape (n,), in flight after the last decision that the rules allow.
         reward_terms: shape (n, 5), of the last decision, in the order of `REWARD_TERMS`.
     """
+
+    KEPT: tuple[str, ...] = ("state", "target", "time_to_go", "index", "pointing_limited")
+    """What flights become, beside what `begin` draws: the arrays that a snapshot keeps."""
 
     def __init__(self, settings: BatchSettings) -> None:
         """Make room; `begin` fills it."""
@@ -116,6 +123,11 @@ class FlightBatch:
             (*limits, pointing_angle(lander)),
         )
         self._pool = None if settings.threads == 1 else ThreadPoolExecutor(settings.threads)
+
+    @property
+    def steps(self) -> Index:
+        """Steps flown in each episode, shape (n,): decisions."""
+        return self.index
 
     def close(self) -> None:
         """Let the threads go."""
@@ -195,14 +207,8 @@ class FlightBatch:
     def _judge(self, place: int) -> Outcome:
         scenario, state = self.scenarios[place], self.state[place]
         assert scenario is not None
-        final, landed = State(state[:3], state[3:6], float(state[6])), bool(self.landed[place])
-        contact = Contact(
-            landed=landed,
-            safe_cell=landed and scenario.tile.is_safe(final.position),
-            tank_empty=self._status[place] == FlightStatus.TANK_EMPTY,
-        )
-        aim, preset = ground_point(scenario, self.target[place]), self.settings.preset
-        return classify(scenario.initial_state, final, aim, contact, preset.lander, preset.rules)
+        final = State(state[:3], state[3:6], float(state[6]))
+        return judge_flight(scenario, final, self.target[place], FlightStatus(self._status[place]))
 
     def aims(self) -> Array:
         """[m] shape (n, 3), where the targets really lie (`hda.task.scenario.ground_point`)."""
@@ -256,6 +262,25 @@ class FlightBatch:
             time_to_go=self.time_to_go[places, None],
             target=self.target[places],
         )
+
+
+def judge_flight(scenario: Scenario, final: State, target: Array, status: FlightStatus) -> Outcome:
+    """How a flight ended that was to end on the target plane.
+
+    Args:
+        scenario: what was flown.
+        final: the last state.
+        target: [m] shape (3,), the last, in the frame of the estimated position.
+        status: where the vehicle was left; in flight, if the rules allow no more decisions.
+    """
+    landed, preset = status != FlightStatus.FLYING, scenario.preset
+    contact = Contact(
+        landed=landed,
+        safe_cell=landed and scenario.tile.is_safe(final.position),
+        tank_empty=status == FlightStatus.TANK_EMPTY,
+    )
+    aim = ground_point(scenario, target)
+    return classify(scenario.initial_state, final, aim, contact, preset.lander, preset.rules)
 
 
 def lengths(vectors: Array) -> Array:

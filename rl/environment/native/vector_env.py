@@ -52,6 +52,9 @@ class LandingVectorEnv(VectorEnv[Seen, Array32, Any], Generic[Seen]):
     as `paper`, `hard` and `partial`. There is no picture: `vectorization_mode="sync"` draws.
     """
 
+    KEPT: tuple[str, ...] = ()
+    """Arrays of its own that a snapshot keeps."""
+
     def __init__(
         self,
         num_envs: int = 1,
@@ -83,7 +86,7 @@ class LandingVectorEnv(VectorEnv[Seen, Array32, Any], Generic[Seen]):
         mode = known[autoreset_mode]
         self.single = self.make_single(**options)
         setting = find_preset(self.single.source.preset)
-        self.batch = FlightBatch(BatchSettings(setting, num_envs, self.single.action_ranges, threads))
+        self.batch = self.make_batch(BatchSettings(setting, num_envs, self.single.action_ranges, threads))
         if max_episode_steps is not None:
             check_count("max_episode_steps", max_episode_steps)
         self.num_envs, self.max_episode_steps = int(num_envs), max_episode_steps
@@ -98,6 +101,10 @@ class LandingVectorEnv(VectorEnv[Seen, Array32, Any], Generic[Seen]):
         self._ended = np.zeros(self.num_envs, np.bool_)
         self._seen: Parts = {}
         self.closed = False
+
+    def make_batch(self, settings: BatchSettings) -> FlightBatch:
+        """What flies them."""
+        return FlightBatch(settings)
 
     @abstractmethod
     def make_single(self, **options: Any) -> LandingEnv[Any]:
@@ -158,7 +165,7 @@ class LandingVectorEnv(VectorEnv[Seen, Array32, Any], Generic[Seen]):
         rewards = batch.advance(actions)
         terminated, truncated = batch.landed.copy(), batch.timed_out.copy()
         if self.max_episode_steps is not None:
-            truncated |= batch.index >= self.max_episode_steps
+            truncated |= batch.steps >= self.max_episode_steps
         self._look(everyone)
         self._ended = terminated | truncated
         info: dict[str, Any] = {}

@@ -13,8 +13,6 @@ from numpy.typing import NDArray
 
 from rl.environment.native.vector_env import LandingVectorEnv
 
-_FLOWN = ("state", "target", "time_to_go", "index", "pointing_limited")
-
 
 def take_snapshot(environments: LandingVectorEnv[Any]) -> dict[str, NDArray[Any]]:
     """What a vector's flights have become, each array with one row for each environment.
@@ -28,7 +26,8 @@ def take_snapshot(environments: LandingVectorEnv[Any]) -> dict[str, NDArray[Any]
     if any(scenario is None for scenario in batch.scenarios) or (batch.landed | batch.timed_out).any():
         raise ValueError("environments must have an episode under way in every row: call reset()")
     numbers = [scenario.streams.episode for scenario in batch.scenarios if scenario is not None]
-    kept = {name: getattr(batch, name).copy() for name in _FLOWN}
+    kept = {name: getattr(batch, name).copy() for name in batch.KEPT}
+    kept |= {name: getattr(environments, name).copy() for name in environments.KEPT}
     return {**kept, "episode": np.array(numbers), "next_episode": environments.next_episode.copy()}
 
 
@@ -52,7 +51,8 @@ def restore_snapshot(
     scenarios = [environments.source.scenario(study_seed, int(number), {}) for number in kept["episode"]]
     for place, scenario in enumerate(scenarios):
         batch.begin(place, scenario)
-    for name in _FLOWN:
-        getattr(batch, name)[:] = kept[name]
+    for owner in (batch, environments):
+        for name in owner.KEPT:
+            getattr(owner, name)[:] = kept[name]
     environments.next_episode = kept["next_episode"].astype(environments.next_episode.dtype)
     return environments.look_again()

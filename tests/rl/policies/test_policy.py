@@ -5,6 +5,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
@@ -84,7 +85,7 @@ def test_the_agent_in_the_environment_equals_the_agent_in_fly(weights, episode):
 
 
 @pytest.mark.parametrize("preset", ["paper", "partial", "navigated"])
-@pytest.mark.parametrize("name", ["td3-convex", "td3-belief"])
+@pytest.mark.parametrize("name", ["td3-convex", "td3-belief", "td3-belief-convex"])
 def test_an_agent_of_another_sight_or_guidance_flies_in_the_environment_as_in_fly(name, preset, tmp_path):
     recipe = replace(RECIPES[name], hidden=(16,))
     env = LunarHDAEnv(preset, sight=recipe.sight, guidance=recipe.guidance)
@@ -109,7 +110,7 @@ def test_fixed_gain_takes_the_agents_sites_and_nothing_else(weights):
     policy = ComposedPolicy("fixed", AgentSite(weights), FixedGainZemZev())
     record = fly(policy, scenario)
     for observation, decision in zip(record.observations, record.decisions, strict=True):
-        actor = load_actor(weights)
+        actor: Any = load_actor(weights)
         site = actor.decide(observation, actor.begin(scenario.view))[0].site
         np.testing.assert_array_equal(decision.site, site)
         assert isinstance(decision.command, ZemZevCommand)

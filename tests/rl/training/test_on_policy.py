@@ -32,6 +32,7 @@ SMALL: dict[str, OnPolicySettings] = {
     "ppo": replace(ON_POLICY_RECIPES["ppo"], hidden=(16, 16), **TINY),
     "recurrent-ppo": replace(ON_POLICY_RECIPES["recurrent-ppo"], hidden=(16,), memory=8, **TINY),  # type: ignore[call-arg]
 }
+SMALL["ppo-thrust"] = replace(ON_POLICY_RECIPES["ppo-thrust"], hidden=(16, 16), **TINY)
 NAMES = sorted(SMALL)
 
 
@@ -85,7 +86,7 @@ def trained(name: str) -> tuple[Any, OnPolicySettings]:
     return algorithm, settings
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", ["ppo", "recurrent-ppo"])
 def test_the_agent_flies_without_torch_what_the_learner_would(name, tmp_path):
     """The memory grows over the episode: each action is compared after all those before it."""
     algorithm, settings = trained(name)
@@ -148,6 +149,15 @@ def test_what_cannot_be_learnt_is_refused():
         make_algorithm(replace(SMALL["ppo"], batch_size=17), vector, 0)
     with pytest.raises(ValueError, match="algorithm must be ppo with these settings, got 'td3'"):
         make_algorithm(replace(SMALL["ppo"], algorithm="td3"), vector, 0)
+
+
+def test_thrust_goes_with_looks_and_without_memory(tmp_path):
+    for changes in ({"sight": "belief"}, {"algorithm": "recurrent-ppo"}):
+        with pytest.raises(ValueError, match="guidance thrust goes with sight look"):
+            run_training(
+                tmp_path, PAPER, replace(SMALL["ppo-thrust"], **changes), plan("ppo", 48), resume=False
+            )
+    assert not any(tmp_path.iterdir())
 
 
 def test_measured_looks_have_no_batch(tmp_path):

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import csv
+import json
 import sys
 from dataclasses import replace
 
@@ -92,6 +93,17 @@ def test_a_run_is_not_overwritten_or_resumed_with_other_settings(tmp_path):
         run_training(folder, PAPER, SMALL["td3"], plan(60, seed=1), resume=True)
     with pytest.raises(ValueError, match="another settings"):
         run_training(folder, PAPER, replace(SMALL["td3"], discount=0.9), plan(60), resume=True)
+
+
+def test_a_run_from_before_a_setting_was_added_goes_on(tmp_path):
+    folder = tmp_path / "run"
+    run_training(folder, PAPER, SMALL["td3"], plan(60), resume=False)
+    card = json.loads((folder / "run.json").read_text())
+    for name in ("sight", "guidance"):
+        del card["settings"][name]
+    (folder / "run.json").write_text(json.dumps(card))
+    run_training(folder, PAPER, SMALL["td3"], plan(80), resume=True)
+    assert read_rows(folder / "training.csv")[-1]["step"] == "80"
 
 
 def test_a_damaged_checkpoint_is_refused(tmp_path):
