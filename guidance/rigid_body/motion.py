@@ -41,6 +41,13 @@ def inertia_scale(mass: float, body: BodyNumbers) -> float:
 
 
 @compile_kernel
+def turning_acceleration(mass: float, body: BodyNumbers) -> float:
+    """[rad/s^2] that the jets give about the slower of the two axes that lean a body of a mass [kg]."""
+    first, second = body.torque_limit[0] / body.inertia[0], body.torque_limit[1] / body.inertia[1]
+    return min(first, second) / inertia_scale(mass, body)
+
+
+@compile_kernel
 def rate_into(y: Array, thrust: Array, torque: Array, body: BodyNumbers, out: Array) -> None:
     """Write the rates of change of position, velocity, attitude, rates and mass, y[:14], into `out`."""
     mass, scalar, first, second, third = y[13], y[6], y[7], y[8], y[9]

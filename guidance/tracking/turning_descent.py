@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike
 from guidance.arrays import Array
 from guidance.constants import MOON_GRAVITY
 from guidance.rigid_body.body import RigidBody
+from guidance.rigid_body.motion import turning_acceleration
 from guidance.rigid_body.quaternion import rotate
 from guidance.state import State
 from guidance.tracking.reference import TrackingReference, make_reference
@@ -170,13 +171,13 @@ def _used_share(
     rate = np.linalg.norm(turned, axis=-1) / step
     bend = np.linalg.norm(np.diff(turned, axis=0), axis=-1) / step**2
     spare = 1.0 - options.turning_margin
-    torque = min(body.torque_limit[0] / body.inertia[0], body.torque_limit[1] / body.inertia[1])
+    fastest = turning_acceleration(mass, body.numbers())
     shares = (
         size.max(axis=0) / most,
         least / np.maximum(size.min(axis=0), 1e-9),
         tilt[1:].max(axis=0) / ((1.0 - options.tilt_margin) * body.tilt_limit),
         rate.max(axis=0) / (spare * body.rate_limit),
-        bend.max(axis=0) / (spare * torque),
+        bend.max(axis=0) / (spare * fastest),
     )
     return np.max(shares, axis=0)
 

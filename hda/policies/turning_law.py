@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from guidance.arrays import Array
 from guidance.rigid_body.body import RigidBody
+from guidance.rigid_body.motion import turning_acceleration
 from guidance.tracking.reference import TrackingReference
 from guidance.tracking.regulator import TrackingWeights, tracking_gains
 from guidance.tracking.turning_descent import DEFAULT_TURNING, TurningOptions, plan_turning_descent
@@ -57,7 +58,6 @@ def reversal_time(body: RigidBody) -> float:
     Args:
         body: the vehicle.
     """
-    about_x, about_y, _ = body.inertia
-    acceleration = min(body.torque_limit[0] / about_x, body.torque_limit[1] / about_y)
+    acceleration = turning_acceleration(body.inertia_mass, body.numbers())
     turns = (_REVERSAL, 2.0 * _REVERSAL, _REVERSAL)
     return sum(2.0 * math.sqrt(angle / acceleration) for angle in turns)

@@ -1,8 +1,9 @@
 """The task: its rules, its presets, and the scenario of an episode.
 
-A preset names ground, starts, sensor, rules, lander and where its flights end; a scenario is one draw from it
-by streams of random numbers that no policy can disturb. What a policy may know is an `Observation` and a
-`ScenarioView`. It imports the ground and the sensor; policies and the simulator import it.
+A preset names ground, starts, sensor, rules, lander, its body, and where its flights end; a scenario is one
+draw from it by streams of random numbers that no policy can disturb. What a policy may know is an
+`Observation` and a `ScenarioView`. It imports the ground and the sensor; policies and the simulator import
+it.
 """
 
 from typing import TYPE_CHECKING

@@ -6,15 +6,17 @@ import math
 
 from guidance.arrays import Array
 from guidance.kernel import compile_kernel
-from guidance.rigid_body.motion import inertia_scale
+from guidance.rigid_body.motion import turning_acceleration
 from guidance.zem_zev import ZemZevGains
 from hda.flight.rigid.turning import Turning
 
 _RIGHTING_SHARE = 0.6  # of the torque that the body is righted with before the touchdown
 _LEAST_LIFT = 1.0  # [m/s^2] upward, against which a sideways correction is weighed at least
 _STEEPEST = 1.5  # [rad]
-_UPRIGHT_TIME = 2.0  # [s] before the touchdown that a body has arrived by ZEM/ZEV
-_LEAST_TIME = 6.0  # [s] by which its gains are worked out at least
+_LEAN = math.radians(10.0)
+_LOOP_TIMES = 4.5  # over the loop's natural frequency: until it has turned all but some percent
+_UPRIGHT_SHARE = 0.65  # of the leaning time: so long before the touchdown a body has arrived by ZEM/ZEV
+_LEAST_SHARE = 2.0  # of the leaning time: for so long at least its gains are worked out
 _LEAST_BURN = 0.3  # [m/s^2] thrust acceleration below which a plan coasts
 
 
@@ -26,10 +28,15 @@ def righting_tilt(turning: Turning, remaining: float) -> float:
         turning: the body.
         remaining: [s].
     """
-    scale = inertia_scale(turning.state[13], turning.body)
-    first = turning.body.torque_limit[0] / turning.body.inertia[0]
-    second = turning.body.torque_limit[1] / turning.body.inertia[1]
-    return 0.25 * _RIGHTING_SHARE * min(first, second) / scale * max(remaining, 0.0) ** 2
+    acceleration = _RIGHTING_SHARE * turning_acceleration(turning.state[13], turning.body)
+    return 0.25 * acceleration * max(remaining, 0.0) ** 2
+
+
+@compile_kernel
+def leaning_time(turning: Turning) -> float:
+    """[s] that the body takes to lean by some degrees: what torques allow, or the loop where it is slower."""
+    fastest = 2.0 * math.sqrt(_LEAN / turning_acceleration(turning.state[13], turning.body))
+    return max(fastest, _LOOP_TIMES / turning.loop.natural_frequency)
 
 
 @compile_kernel
@@ -48,7 +55,8 @@ def steer_across(
     """
     if turning is None:
         return
-    left = max(remaining - _UPRIGHT_TIME, _LEAST_TIME)
+    lean = leaning_time(turning)
+    left = max(remaining - _UPRIGHT_SHARE * lean, _LEAST_SHARE * lean)
     for axis in range(2):
         speed = seen[3 + axis]
         miss = site[axis] - seen[axis] - speed * left

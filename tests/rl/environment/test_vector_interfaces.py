@@ -174,6 +174,7 @@ def test_what_is_seen_shares_no_memory_with_what_is_kept(kind):
     [
         ({"preset": "lidar"}, "vectorization_mode='sync'"),
         ({"preset": "navigated"}, "vectorization_mode='sync'"),
+        ({"preset": "rigid-body"}, "no filter and no body"),
         ({"preset": "papr"}, "preset"),
         ({"num_envs": 0}, "num_envs"),
         ({"threads": 0}, "threads"),
