@@ -1,9 +1,10 @@
 """What each layer of reality costs each policy, and whether their order is still the order at the end.
 
 The same episodes are flown in setting after setting: maps with noise, looks that are measured, a navigation
-filter, a body that must turn. table.md has the fall of success from setting to setting, paired, the propellant
-that it costs, and what `studies.failures` finds in the first episodes that a setting loses, each flown again.
-order.md has every pair of policies whose order changes, with the lead in each setting; order.csv has all pairs.
+filter, a body that must turn. table.md has the fall of success from setting to setting, paired, the
+propellant that it costs, and what `studies.failures` finds in the first episodes that a setting loses, each
+flown again. order.md has every pair of policies whose order changes, with the lead in each setting; order.csv
+has all pairs.
 """
 
 from __future__ import annotations
