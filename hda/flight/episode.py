@@ -226,9 +226,7 @@ Decide = Callable[[Observation, Memory], tuple[Decision, Memory]]
 """Gives the decision on an observation, and the memory for the next."""
 
 
-def fly_leg(
-    scenario: Scenario, flight: Flight, decide: Decide[Memory], memory: Memory
-) -> tuple[Leg, Memory]:
+def fly_leg(scenario: Scenario, flight: Flight, decide: Decide[Memory], memory: Memory) -> tuple[Leg, Memory]:
     """Look, decide, fly on once; give the leg and the memory after it.
 
     Raises:
@@ -277,9 +275,7 @@ def _check_answer(name: str, answer: object) -> tuple[Decision, Any]:
     return decision, memory
 
 
-def begin_decisions(
-    policy: Policy[Any] | PrivilegedPolicy, scenario: Scenario
-) -> tuple[Decide[Any], Any]:
+def begin_decisions(policy: Policy[Any] | PrivilegedPolicy, scenario: Scenario) -> tuple[Decide[Any], Any]:
     """How a policy decides in an episode, with its answers checked, and its memory before the first look."""
     pilot = inform_pilot(policy, scenario)
 

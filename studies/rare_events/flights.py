@@ -15,7 +15,7 @@ from hda.task.scenario import Scenario, branch_scenario, ground_point, sample_sc
 from studies.campaign.monte_carlo import Study
 from studies.failures.causes import explain_failure, last_change
 from studies.rare_events.level_values import LevelValues, Passage
-from studies.rare_events.levels import Standing, nearest_safe_cell, safe_share, stand
+from studies.rare_events.levels import find_level, nearest_safe_cell, safe_share
 from studies.rare_events.splitting import NO_WINDOW, Ended, Tree, Window, grow_tree
 
 _ROUND = 12  # [m] about a site, of which the safe share is told
@@ -127,19 +127,21 @@ def _fly_on(
     return Ended(join_legs(name, scenario, flown[::-1]))
 
 
-def fly_root(study: Study, episode: int, values: LevelValues | None, scale: float) -> RootRow:
+def fly_root(study: Study, episode: int, values: LevelValues | None, effort: float) -> RootRow:
     """Fly an episode of a study as a tree.
 
     Args:
         study: of one policy.
         episode: number.
         values: of the levels; None for a whole flight.
-        scale: of the weights (`LevelValues.window`).
+        effort: whole flights that an episode may cost, in the mean.
     """
     scenario = sample_scenario(study.preset, study.study_seed, episode, study.split)
 
     def window(flight: Flight) -> Window:
-        return NO_WINDOW if values is None else values.window(stand(scenario, flight), scale)
+        if values is None:
+            return NO_WINDOW
+        return values.window(flight.index, find_level(scenario, flight), effort)
 
     tree = grow_episode(study.make_policy(study.policies[0]), scenario, window)
     return RootRow(
@@ -188,13 +190,12 @@ def describe_leaf(weight: float, record: EpisodeRecord) -> LeafRow:
 def fly_passage(study: Study, episode: int) -> tuple[Passage, int]:
     """Fly an episode of a pilot whole; give its passage, and the decision intervals flown."""
     scenario = sample_scenario(study.preset, study.study_seed, episode, study.split)
-    seen: list[Standing] = []
+    seen: list[int] = []
 
     def note(flight: Flight) -> Window:
-        seen.append(stand(scenario, flight))
+        seen.append(find_level(scenario, flight))
         return NO_WINDOW
 
     tree = grow_episode(study.make_policy(study.policies[0]), scenario, note)
     (leaf,) = tree.leaves
-    stages, levels = (tuple(getattr(one, name) for one in seen) for name in ("stage", "level"))
-    return Passage(stages, levels, not leaf.end.outcome.success), tree.steps
+    return Passage(tuple(seen), not leaf.end.outcome.success), tree.steps

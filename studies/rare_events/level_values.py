@@ -1,12 +1,10 @@
-"""What a pilot says of each level: how likely a flight there fails, and how many steps it still takes.
+"""What a pilot says of each level: how likely a flight fails from there, and how many branches that is worth.
 
-Both follow backward along the steps that the pilot saw: the value of a level is the mean of the values of the
-levels that came next. Levels that were seen seldom lean on the mean of their stage.
-
-The windows are those of efficiency: roulette where the second moment of the outcome is worth less than the
-steps to come, splitting where its variance is worth more (Rath et al., EARS: Efficiency-Aware Russian
-Roulette and Splitting, ACM Transactions on Graphics 41(4), 2022). For an event of probability p these are p
-and p (1 - p), so that a flight that is certain to fail is flown to its end, and not split.
+The probability is the share of the pilot's flights through the level, at this look, that failed. Branches are as dense as the root of the second moment of what they will show, the
+best that weights can do where levels are all that is known (Garvels, The Splitting Method in Rare Event
+Simulation, University of Twente, 2000); for an event of probability p that is sqrt(p). A branch is split
+by its variance, sqrt(p (1 - p)) (Rath et al., EARS: Efficiency-Aware Russian Roulette and Splitting, ACM
+Transactions on Graphics 41(4), 2022), so that one that is certain to fail is flown to its end, and not split.
 """
 
 from __future__ import annotations
@@ -18,13 +16,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from guidance.arrays import Array
-from studies.rare_events.levels import LEVELS, Standing
+from studies.rare_events.levels import SHAPE
 from studies.rare_events.splitting import Window
 
-_PRIOR = 2.0  # visits that the stage's mean counts as
-_LEAST = 0.03  # of the mean probability: below it a level is not trusted to be safe
-_SWEEPS = 60
-_SLACK = 0.7  # roulette spares what is but little too light; so is a branch that was just split
+_PRIOR = 1.0  # failures that what is expected of a level counts as
+_LIGHTEST, _HEAVIEST = 0.1, 2.0  # of the look's mean: a pilot is not trusted further
+_DENSITY = (1.7, 1.2, 1.0)  # of branches at the first looks: what is given up later was worth a look
+_SLACK = 0.6  # roulette spares what is but little too light
+_ROULETTES = 4  # first looks at which it is played: later too little is left to fly
+_LEVELS = math.prod(SHAPE)
 
 
 @dataclass(frozen=True)
@@ -32,12 +32,10 @@ class Passage:
     """One flight of a pilot.
 
     Attributes:
-        stages: of each look.
         levels: of each look.
         failed: how it ended.
     """
 
-    stages: tuple[int, ...]
     levels: tuple[int, ...]
     failed: bool
 
@@ -47,35 +45,20 @@ class LevelValues:
     """Values of the levels.
 
     Attributes:
-        failure: shape (stages, LEVELS), probability that a flight fails from there.
-        steps: the same shape, expected number of steps to come.
-        visits: the same shape, mean number of looks there of a flight.
+        failure: shape (looks, levels), probability that a flight fails from there.
+        weight: the same shape, weight of the branches that a level is worth, if an episode may cost a whole
+            flight.
     """
 
     failure: Array
-    steps: Array
-    visits: Array
+    weight: Array
 
-    def desired(self, standing: Standing) -> float:
-        """Density of branches that a level is worth, in a unit of its own."""
-        return float(np.sqrt(self.failure[self._place(standing)] / self.steps[self._place(standing)]))
-
-    def window(self, standing: Standing, scale: float) -> Window:
-        """Window of weights in a level; `scale` is the weight at a density of 1."""
-        failure = float(self.failure[self._place(standing)])
-        desired = scale / self.desired(standing)
-        return Window(_SLACK * desired, desired / math.sqrt(max(1.0 - failure, 1e-9)))
-
-    def scale(self, steps: float) -> float:
-        """The scale at which a start costs about `steps` steps.
-
-        Levels are taken to be visited by branches of the weight that is desired there.
-        """
-        density = np.sqrt(self.failure / self.steps)
-        return float((self.visits * density).sum()) / steps
-
-    def _place(self, standing: Standing) -> tuple[int, int]:
-        return min(standing.stage, self.failure.shape[0] - 1), standing.level
+    def window(self, look: int, level: int, effort: float) -> Window:
+        """Window of weights in a level before a look, where an episode may cost `effort` whole flights."""
+        place = min(look, self.failure.shape[0] - 1), level
+        failure, desired = float(self.failure[place]), float(self.weight[place]) / effort
+        low = _SLACK * desired if look < _ROULETTES else 0.0
+        return Window(low, desired, desired / math.sqrt(max(1.0 - failure, 1e-9)))
 
 
 def fit_values(passages: Sequence[Passage]) -> LevelValues:
@@ -86,31 +69,37 @@ def fit_values(passages: Sequence[Passage]) -> LevelValues:
     """
     if not passages:
         raise ValueError("pilot must fly at least one flight")
-    stages = 1 + max(max(passage.stages) for passage in passages)
-    shape, states = (stages, LEVELS), stages * LEVELS
-    moves, fails = np.zeros((states, states)), np.zeros(states)
+    looks = max(len(passage.levels) for passage in passages)
+    visits, fails = np.zeros((looks, _LEVELS)), np.zeros((looks, _LEVELS))
     for passage in passages:
-        places = [s * LEVELS + k for s, k in zip(passage.stages, passage.levels, strict=True)]
-        for place, following in zip(places, places[1:], strict=False):
-            moves[place, following] += 1.0
-        fails[places[-1]] += passage.failed
-    visits = np.zeros(states)
-    for passage in passages:
-        for s, k in zip(passage.stages, passage.levels, strict=True):
-            visits[s * LEVELS + k] += 1.0
+        for look, level in enumerate(passage.levels):
+            visits[look, level] += 1.0
+            fails[look, level] += passage.failed
     share = (0.5 + sum(passage.failed for passage in passages)) / (1.0 + len(passages))
-    failure, steps = np.full(states, share), np.ones(states)
-    for _ in range(_SWEEPS):
-        failure = _lean(moves @ failure + fails, visits, stages, share)
-        steps = _lean(moves @ steps + visits, visits, stages, 1.0)
-    failure = np.clip(failure, _LEAST * share, 1.0)
-    return LevelValues(
-        failure.reshape(shape), np.maximum(steps, 1.0).reshape(shape), visits.reshape(shape) / len(passages)
-    )
+    failure = np.array([_lean_on_classes(*each, share) for each in zip(fails, visits, strict=True)])
+    density = np.sqrt(failure)
+    mean = ((density * visits).sum(axis=1) + math.sqrt(share)) / (visits.sum(axis=1) + 1.0)
+    weight = np.clip(mean[:, None] / density, _LIGHTEST, _HEAVIEST)
+    for look in range(looks):
+        weight[look] /= _DENSITY[min(look, len(_DENSITY) - 1)]
+    return LevelValues(failure, weight)
 
 
-def _lean(totals: Array, visits: Array, stages: int, otherwise: float) -> Array:
-    """Means over the visits, leaning on the mean of their level, and that on the mean of all."""
-    table, count = totals.reshape(stages, -1), visits.reshape(stages, -1)
-    by_level = (table.sum(axis=0) + _PRIOR * otherwise) / (count.sum(axis=0) + _PRIOR)
-    return ((table + _PRIOR * by_level) / (count + _PRIOR)).ravel()
+def _lean_on_classes(fails: Array, visits: Array, share: float) -> Array:
+    """Probabilities at a look from failures and visits of each level; where few failed, from its classes.
+
+    A level is expected to fail as all do, times the ratio of each of its classes to that. Ratios and levels
+    are leant on 1 and on that as gamma distributed rates are, by _PRIOR failures.
+
+    Args:
+        fails: shape (levels,).
+        visits: shape (levels,).
+        share: of all flights that fail.
+    """
+    failed, seen, expected = fails.reshape(SHAPE), visits.reshape(SHAPE), np.full(SHAPE, share)
+    for axis in range(len(SHAPE)):
+        others = tuple(k for k in range(len(SHAPE)) if k != axis)
+        ratio = (failed.sum(axis=others) + _PRIOR) / (share * seen.sum(axis=others) + _PRIOR)
+        expected *= ratio.reshape([-1 if k == axis else 1 for k in range(len(SHAPE))])
+    leant = (failed + _PRIOR) / (seen + _PRIOR / np.minimum(expected, 1.0))
+    return np.minimum(leant, 1.0).ravel()

@@ -1,61 +1,79 @@
 """Levels of danger: where a flight stands before a look, by what the true map says of its target.
 
-The policy never learns of them: they only decide which flights are worth flying on, and how often.
+Three things make a level: whether the sensor will see the target in the looks to come, how far the target lies
+from the nearest hazard, and how much safe ground there is about it. The policy never learns of them: they
+only decide which flights are worth flying on, and how often.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from guidance.arrays import Array
+from guidance.state import State
 from hda.flight.episode import Flight
-from hda.ground.tile import Tile
 from hda.task.scenario import Scenario, ground_point
 
-_EDGES = (0.06, 0.15, 0.4, 1.0)  # [m] from a site to the nearest hazard
-_SHARES = (0.05, 0.25, 0.5)  # of safe ground about it
+_SIGHTS = (0.95, 1.05)  # of the off-nadir limit
+_MARGINS = (0.06, 0.15, 0.4, 1.0)  # [m] to the nearest hazard
+_SHARES = (0.05, 0.25, 0.5)  # of safe ground about a site
 _ROUND = 12  # [m] about it
-_MARGINS, _ROOMS = len(_EDGES) + 1, len(_SHARES) + 1
-LOST = (_MARGINS + 1) * _ROOMS
-"""Level of a hazardous target without safe ground in view."""
-LEVELS = LOST + 1
-"""Levels of the ground: a safe target by its margin and room, a hazardous one by the room of the nearest safe
-ground, and LOST."""
+_REACH = math.ceil(_MARGINS[-1])
+_HAZARD, _LOST = len(_MARGINS) + 1, len(_MARGINS) + 2
+
+SHAPE = (len(_SIGHTS) + 1, len(_MARGINS) + 3, len(_SHARES) + 1)
+"""Classes of sight, margin and room; the last two margins are those of a hazardous target, which has safe
+ground in view, or none."""
 
 
-@dataclass(frozen=True)
-class Standing:
-    """Where a flight stands before a look.
+def find_level(scenario: Scenario, flight: Flight) -> int:
+    """Number of the level of a flight before its next look, below the product of SHAPE.
 
-    Attributes:
-        stage: looks to come after this one, by the time to go.
-        level: of the ground, below LEVELS.
+    A hazardous target is judged by the nearest safe ground in view, where a policy may go from it.
     """
+    rules, lidar, safe = scenario.preset.rules, scenario.preset.lidar, scenario.tile.deterministic
+    target, state = ground_point(scenario, flight.target), flight.state
+    row, column = math.floor(target[1]), math.floor(target[0])
+    if scenario.tile.is_safe(target):
+        margin = int(np.searchsorted(_MARGINS, hazard_distance(safe, target, _REACH)))
+    else:
+        reach = math.ceil(0.5 * lidar.width(state.position, target))
+        found = nearest_safe_cell(safe, row, column, reach)
+        margin = _LOST if found is None else _HAZARD
+        row, column = found or (row, column)
+        target = np.array([column + 0.5, row + 0.5, target[2]])
+    limit, interval = math.tan(lidar.off_nadir_limit), rules.decision_interval
+    sight = int(np.searchsorted(_SIGHTS, widest_slope(state, target, flight.time_to_go, interval) / limit))
+    room = int(np.searchsorted(_SHARES, safe_share(safe, row, column, _ROUND)))
+    return int(np.ravel_multi_index((sight, margin, room), SHAPE))
 
-    stage: int
-    level: int
 
+def widest_slope(state: State, site: Array, time_to_go: float, interval: float) -> float:
+    """Greatest tangent of the angle from the vertical under which the looks to come will see a site.
 
-def stand(scenario: Scenario, flight: Flight) -> Standing:
-    """Find the level of a flight before its next look."""
-    rules, tile = scenario.preset.rules, scenario.tile
-    stage = int(flight.time_to_go / rules.decision_interval)
-    target = ground_point(scenario, flight.target)
-    width = scenario.preset.lidar.width(flight.state.position, target)
-    return Standing(min(stage, rules.max_decisions), _level(tile, target, 0.5 * width))
+    The flight is taken to be that of least energy to rest at the site, a cubic of the time to go
+    (D'Souza, AIAA 97-3709): with offset e and velocity v at the time to go t, at the time to go s it is
+    (3 e / t^2 + v / t) s^2 - (2 e / t^3 + v / t^2) s^3. Of the last second nothing is asked.
 
+    Args:
+        state: at this look.
+        site: [m] shape (3,).
+        time_to_go: [s] at this look.
+        interval: [s] between looks.
 
-def _level(tile: Tile, target: Array, reach: float) -> int:
-    safe, row, column = tile.deterministic, math.floor(target[1]), math.floor(target[0])
-    if tile.is_safe(target):
-        margin = int(np.searchsorted(_EDGES, hazard_distance(safe, target, math.ceil(_EDGES[-1]))))
-        return margin * _ROOMS + _room(safe, row, column)
-    found = nearest_safe_cell(safe, row, column, math.ceil(reach))
-    return LOST if found is None else _MARGINS * _ROOMS + _room(safe, *found)
+    Returns:
+        The tangent; 0 where no look is to come.
+    """
+    left = np.arange(time_to_go - interval, 1.0, -interval)
+    if left.size == 0:
+        return 0.0
+    offset, velocity, t = state.position - site, state.velocity, time_to_go
+    square, cube = 3.0 * offset / t**2 + velocity / t, 2.0 * offset / t**3 + velocity / t**2
+    east, north, up = square[:, None] * left**2 - cube[:, None] * left**3
+    return float((np.hypot(east, north) / np.maximum(up, 1e-3)).max())
 
 
 def hazard_distance(safe: NDArray[np.bool_], point: Array, reach: int) -> float:
@@ -73,9 +91,7 @@ def hazard_distance(safe: NDArray[np.bool_], point: Array, reach: int) -> float:
     return float(np.where(near, np.inf, distance).min())
 
 
-def nearest_safe_cell(
-    safe: NDArray[np.bool_], row: int, column: int, reach: int
-) -> tuple[int, int] | None:
+def nearest_safe_cell(safe: NDArray[np.bool_], row: int, column: int, reach: int) -> tuple[int, int] | None:
     """The safe cell nearest to (row, column) within `reach` cells along each axis, or None."""
     first_row, first_column = max(row - reach, 0), max(column - reach, 0)
     near = safe[first_row : max(row + reach + 1, 0), first_column : max(column + reach + 1, 0)]
@@ -91,7 +107,3 @@ def safe_share(safe: NDArray[np.bool_], row: int, column: int, radius: int) -> f
     """Share of safe cells in the square of 2 radius + 1 cells about a cell; outside the map is unsafe."""
     near = safe[max(row - radius, 0) : row + radius + 1, max(column - radius, 0) : column + radius + 1]
     return float(np.count_nonzero(near)) / (2 * radius + 1) ** 2
-
-
-def _room(safe: NDArray[np.bool_], row: int, column: int) -> int:
-    return int(np.searchsorted(_SHARES, safe_share(safe, row, column, _ROUND)))

@@ -1,7 +1,7 @@
 """Splitting and Russian roulette: one weighted tree of branches that grows out of one start.
 
 Before each step a branch is held against a window of weights. Above it the branch is split into equal parts;
-below it the branch goes on with a chance that is its weight over the lower end, and then weighs as much as
+below it the branch goes on with a chance that is its weight over a heavier one, and then weighs as much as
 that. Either way the expected weight stays, so the weighted count of any event is unbiased whatever the
 windows are; they decide how much it scatters and what it costs.
 
@@ -31,14 +31,16 @@ class Window:
 
     Attributes:
         low: roulette is played below it.
-        high: a heavier branch is split into so many parts as bring it nearest to this; at least `low`.
+        aim: weight of what survives it; at least `low`.
+        high: a heavier branch is split into so many parts as bring it nearest to this; at least `aim`.
     """
 
     low: float
+    aim: float
     high: float
 
 
-NO_WINDOW = Window(0.0, np.inf)
+NO_WINDOW = Window(0.0, 1.0, np.inf)
 """Neither splitting nor roulette: a branch is a whole flight."""
 
 
@@ -106,9 +108,9 @@ def grow_tree(
         state, weight, branch = waiting.pop()
         limits = window(state)
         if weight < limits.low:
-            if rng.random() * limits.low >= weight:
+            if rng.random() * limits.aim >= weight:
                 continue
-            weight = limits.low
+            weight = limits.aim
         parts = min(max(1, round(weight / limits.high)), MOST_PARTS)
         numbers = (branch, *range(branches, branches + parts - 1))
         branches += parts - 1
