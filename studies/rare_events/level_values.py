@@ -1,10 +1,11 @@
 """What a pilot says of each level: how likely a flight fails from there, and how many branches that is worth.
 
-The probability is the share of the pilot's flights through the level, at this look, that failed. Branches are as dense as the root of the second moment of what they will show, the
-best that weights can do where levels are all that is known (Garvels, The Splitting Method in Rare Event
-Simulation, University of Twente, 2000); for an event of probability p that is sqrt(p). A branch is split
-by its variance, sqrt(p (1 - p)) (Rath et al., EARS: Efficiency-Aware Russian Roulette and Splitting, ACM
-Transactions on Graphics 41(4), 2022), so that one that is certain to fail is flown to its end, and not split.
+The probability is the share of the pilot's flights through the level, at this look, that failed. Branches
+are as dense as the root of the second moment of what they will show, the best that weights can do where
+levels are all that is known (Garvels, The Splitting Method in Rare Event Simulation, University of Twente,
+2000); for an event of probability p that is sqrt(p). A branch is split by its variance, sqrt(p (1 - p))
+(Rath et al., EARS: Efficiency-Aware Russian Roulette and Splitting, ACM Transactions on Graphics 41(4),
+2022), so that one that is certain to fail is flown to its end, and not split.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Levels of danger: where a flight stands before a look, by what the true map says of its target.
 
-Three things make a level: whether the sensor will see the target in the looks to come, how far the target lies
-from the nearest hazard, and how much safe ground there is about it. The policy never learns of them: they
-only decide which flights are worth flying on, and how often.
+Three things make a level: whether the sensor will see the target in the looks to come, how far the target
+lies from the nearest hazard, and how much safe ground there is about it. The policy never learns of them:
+they only decide which flights are worth flying on, and how often.
 """
 
 from __future__ import annotations

@@ -197,8 +197,6 @@ CAUSE_COLUMNS: tuple[Column[CauseRow], ...] = (
     Column("episodes", "episodes", lambda row: row.roots),
     Column("chosen", "last choice at look", lambda row: row.chosen, digits=1),
     Column("divert_m", "from first target", lambda row: row.divert_m, digits=0, unit="m"),
-    Column(
-        "safe_share_percent", "safe about the site", lambda row: 100.0 * row.safe_share, digits=0, unit="%"
-    ),
+    Column("safe_share_percent", "safe around", lambda row: 100.0 * row.safe_share, digits=0, unit="%"),
 )
 """The table of causes."""
