@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from hda.flight.episode import Decide, Flight, Leg, begin_decisions, begin_flight, fly_leg
+from hda.flight.episode import Decide, Flight, Leg, begin_decisions, begin_flight, elevation_angle, fly_leg
 from hda.flight.record import EpisodeRecord, join_legs
 from hda.policies.entry import AnyPolicy
 from hda.task.scenario import Scenario, branch_scenario, ground_point, sample_scenario
@@ -35,6 +35,8 @@ class LeafRow:
         safe_site: the last site is truly safe.
         safe_share: truly safe share of the ground within 12 m of the last site, north and east.
         divert_m: from the first target to the last site.
+        off_nadir_deg: greatest angle from the vertical under which the lander saw its target, the last look
+            left out.
     """
 
     weight: float
@@ -46,6 +48,7 @@ class LeafRow:
     safe_site: bool
     safe_share: float
     divert_m: float
+    off_nadir_deg: float
 
 
 @dataclass(frozen=True)
@@ -57,7 +60,6 @@ class RootRow:
         tile: number of the tile.
         steps: decision intervals flown.
         branches: how many flights were begun, the episode's own among them.
-        altitude_m: of the start, above the map datum.
         nearest_safe_m: from the first target to the nearest truly safe cell.
         leaves: every flight that came to its end.
     """
@@ -66,7 +68,6 @@ class RootRow:
     tile: int
     steps: int
     branches: int
-    altitude_m: float
     nearest_safe_m: float
     leaves: tuple[LeafRow, ...]
 
@@ -149,7 +150,6 @@ def fly_root(study: Study, episode: int, values: LevelValues | None, effort: flo
         tile=scenario.tile.number,
         steps=tree.steps,
         branches=tree.branches,
-        altitude_m=float(scenario.initial_state.position[2]),
         nearest_safe_m=_nearest_safe(scenario),
         leaves=tuple(describe_leaf(leaf.weight, leaf.end) for leaf in tree.leaves),
     )
@@ -184,7 +184,14 @@ def describe_leaf(weight: float, record: EpisodeRecord) -> LeafRow:
         safe_site=scenario.tile.is_safe(site),
         safe_share=safe_share(scenario.tile.deterministic, row, column, _ROUND),
         divert_m=float(np.hypot(*(site - scenario.nominal_target)[:2])),
+        off_nadir_deg=_widest_view(record),
     )
+
+
+def _widest_view(record: EpisodeRecord) -> float:
+    looks = record.observations[:-1] or record.observations
+    angles = [0.5 * np.pi - elevation_angle(look.state.position, look.target) for look in looks]
+    return float(np.degrees(max(angles)))
 
 
 def fly_passage(study: Study, episode: int) -> tuple[Passage, int]:

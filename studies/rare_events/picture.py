@@ -17,9 +17,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _PANELS: tuple[tuple[str, Callable[[RootRow, LeafRow], float]], ...] = (
-    ("altitude of the start [m]", lambda root, leaf: root.altitude_m),
     ("first target to the nearest safe ground [m]", lambda root, leaf: root.nearest_safe_m),
     ("first target to the last site [m]", lambda root, leaf: leaf.divert_m),
+    ("greatest angle of a target from the vertical [deg]", lambda root, leaf: leaf.off_nadir_deg),
     ("look at which the last site was chosen", lambda root, leaf: float(leaf.chosen)),
     ("safe share of the ground about the last site", lambda root, leaf: leaf.safe_share),
 )

@@ -158,6 +158,7 @@ class CauseRow:
         roots: episodes that they belong to.
         chosen: mean number of the look at which the last site was chosen.
         divert_m: mean distance from the first target to the last site.
+        off_nadir_deg: mean of the greatest angle from the vertical under which a target was seen.
         safe_share: mean safe share of the ground about the last site.
     """
 
@@ -167,6 +168,7 @@ class CauseRow:
     roots: int
     chosen: float
     divert_m: float
+    off_nadir_deg: float
     safe_share: float
 
 
@@ -183,7 +185,7 @@ def count_causes(roots: Sequence[RootRow]) -> list[CauseRow]:
         weight = sum(leaf.weight for _, leaf in failed)
         means = [
             sum(leaf.weight * getattr(leaf, name) for _, leaf in failed) / weight
-            for name in ("chosen", "divert_m", "safe_share")
+            for name in ("chosen", "divert_m", "off_nadir_deg", "safe_share")
         ]
         episodes = len({episode for episode, _ in failed})
         rows.append(CauseRow(cause, weight / total, len(failed), episodes, *means))
@@ -197,6 +199,7 @@ CAUSE_COLUMNS: tuple[Column[CauseRow], ...] = (
     Column("episodes", "episodes", lambda row: row.roots),
     Column("chosen", "last choice at look", lambda row: row.chosen, digits=1),
     Column("divert_m", "from first target", lambda row: row.divert_m, digits=0, unit="m"),
+    Column("off_nadir_deg", "off the vertical", lambda row: row.off_nadir_deg, digits=0, unit="deg"),
     Column("safe_share_percent", "safe around", lambda row: 100.0 * row.safe_share, digits=0, unit="%"),
 )
 """The table of causes."""

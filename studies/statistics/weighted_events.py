@@ -50,7 +50,7 @@ def weighted_interval(
     starts = np.bincount(member)
     mean = float(counted.sum()) / number
     if starts.size == 1:
-        return Interval(mean, 0.0, 1.0)
+        return Interval(mean, 0.0, max(1.0, mean))
     totals = np.bincount(member, weights=counted)
     between = starts.size / (starts.size - 1) * float(((totals - mean * starts) ** 2).sum())
     tail = 0.5 - 0.5 * level
@@ -62,7 +62,7 @@ def weighted_interval(
         low = variance / (2.0 * mean) * float(chi2.ppf(tail, 2.0 * mean**2 / variance))
     reach, spread = mean + jump, variance + jump**2
     high = spread / (2.0 * reach) * float(chi2.isf(tail, 2.0 * reach**2 / spread))
-    return Interval(mean, min(low, mean), min(1.0, max(high, mean)))
+    return Interval(mean, min(low, mean), max(min(high, 1.0), mean))
 
 
 def relative_error(events: ArrayLike) -> float:
