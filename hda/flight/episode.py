@@ -245,11 +245,6 @@ def fly_leg(scenario: Scenario, flight: Flight, decide: Decide[Memory], memory: 
 def fly_legs(scenario: Scenario, decide: Decide[Memory], memory: Memory) -> Iterator[Leg]:
     """Look, decide, fly on, until the episode ends: one leg after another.
 
-    Args:
-        scenario: what to fly.
-        decide: gives the decision on an observation, and the memory for the next.
-        memory: before the first look.
-
     Raises:
         ValueError: flights end on the target plane, and a decision's site is not on it.
     """

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from matplotlib.patches import StepPatch
 
 from guidance.state import State
 from hda.flight.episode import begin_flight, fly
@@ -207,7 +208,10 @@ def test_the_level_of_a_start_is_one_of_those_that_exist() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("policy", ["single-divert", "nearest-safe"])
 def test_trees_and_whole_flights_agree(policy: str) -> None:
-    """The first fails in one flight of ten, the other in one of forty. Four standard errors of the difference: a false alarm in 16000."""
+    """The first fails in one flight of ten, the other in one of forty.
+
+    Four standard errors of the difference: a false alarm in 16000.
+    """
     study = Study(PRESETS["paper"], (policy,), 1, 4)
     prepare_study(study, workers=1)
     tuning = replace(study, split="tuning")
@@ -266,5 +270,7 @@ def test_the_figure_shows_shares_of_failing_flights_and_of_all() -> None:
     panels = figure.get_axes()
     assert len(panels) == 6
     for panel in panels[:5]:
-        for patch in panel.patches:
-            assert sum(patch.get_data().values) == pytest.approx(100.0)
+        steps = [patch for patch in panel.patches if isinstance(patch, StepPatch)]
+        assert [step.get_label() for step in steps] == ["all flights", "failing"]
+        for step in steps:
+            assert np.sum(step.get_data().values) == pytest.approx(100.0)
