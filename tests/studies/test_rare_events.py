@@ -273,4 +273,4 @@ def test_the_figure_shows_shares_of_failing_flights_and_of_all() -> None:
         steps = [patch for patch in panel.patches if isinstance(patch, StepPatch)]
         assert [step.get_label() for step in steps] == ["all flights", "failing"]
         for step in steps:
-            assert np.sum(step.get_data().values) == pytest.approx(100.0)
+            assert np.sum(step.get_data()[0]) == pytest.approx(100.0)
