@@ -54,6 +54,9 @@ GROUPS: dict[str, dict[str, Command]] = {
         ),
         "faults": Command("studies.faults", "Faults", "each fault of the navigation sensors"),
         "realism": Command("studies.realism.command", "Realism", "what each layer of reality costs a policy"),
+        "rare-events": Command(
+            "studies.rare_events.command", "RareEvents", "how likely a policy fails, where failures are rare"
+        ),
         "failures": Command("studies.failures.command", "Failures", "why episodes of a comparison failed"),
         "memory": Command("studies.memory.command", "MemoryStudy", "when memory helps an agent"),
         "stability": Command(

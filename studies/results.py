@@ -82,6 +82,16 @@ RESULTS: dict[str, Result] = {
         "studies.realism --presets paper lidar lidar-coarse --episodes 1000 --out results/measured",
     ),
     "realism": Result("realism.md", "studies.realism --episodes 1000"),
+    "rare-events": Result("rare-events.md", "studies.rare_events --effort 0.08 --whole 6000"),
+    "rare-events-single-divert": Result(
+        "rare-events.md",
+        "studies.rare_events --policy single-divert --effort 0.08 --whole 6000 --out results/rare_divert",
+    ),
+    "rare-events-hazard-aware": Result(
+        "rare-events.md",
+        "studies.rare_events --policy hazard-aware --whole 600 --out results/rare_hazard_aware",
+    ),
+    "rare-causes": Result("rare-events.md", "studies.rare_events --effort 0.5 --out results/rare_causes"),
     "rigid-plans": Result("../explanation/rigid-body.md", "studies.rigid_plans --starts 1000"),
     "scale": Result("scale.md", "studies.scale --episodes 1000 10000"),
 }

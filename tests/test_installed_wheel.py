@@ -58,6 +58,10 @@ RUNS: dict[str, tuple[list[str], list[str]]] = {
         [*SMALL, "--presets", "paper", "partial", "--policies", "single-divert", "--out", "layered"],
         ["layered/table.csv", "layered/order.md", "layered/realism.png"],
     ),
+    "studies.rare_events": (
+        ["--episodes", "4", "--pilot", "2", "--workers", "1", "--out", "rare"],
+        ["rare/table.csv", "rare/causes.md", "rare/rare-events.png"],
+    ),
     "studies.failures": (["--study", "failing", "--out", "failed"], ["failed/failures.csv"]),
     "studies.looks": (
         [

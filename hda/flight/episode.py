@@ -18,7 +18,7 @@ from guidance.rigid_body.state import RigidState
 from guidance.state import State
 from guidance.upright_time import upright_time_to_go
 from hda.flight.outcome import Contact, Outcome, RewardTerms, classify, score_step
-from hda.flight.record import EpisodeRecord
+from hda.flight.record import EpisodeRecord, join_legs
 from hda.flight.rigid.turning import believed_attitude
 from hda.flight.touchdown_report import judge_touchdown
 from hda.flight.vehicle import ControlPeriods, FlightErrors, FlightStatus, Segment, Surroundings, fly_over
@@ -203,32 +203,37 @@ class Leg:
     flight_time: float
 
 
-def fly_legs(
-    scenario: Scenario,
-    decide: Callable[[Observation, Memory], tuple[Decision, Memory]],
-    memory: Memory,
-) -> Iterator[Leg]:
-    """Look, decide, fly on, until the episode ends: one leg after another.
+Decide = Callable[[Observation, Memory], tuple[Decision, Memory]]
+"""Gives the decision on an observation, and the memory for the next."""
 
-    Args:
-        scenario: what to fly.
-        decide: gives the decision on an observation, and the memory for the next.
-        memory: before the first look.
+
+def fly_leg(scenario: Scenario, flight: Flight, decide: Decide[Memory], memory: Memory) -> tuple[Leg, Memory]:
+    """Look, decide, fly on once; give the leg and the memory after it.
+
+    Raises:
+        ValueError: flights end on the target plane, and the decision's site is not on it.
+    """
+    started = clock.perf_counter()
+    observation = observe(scenario, flight)
+    looked = clock.perf_counter()
+    decision, memory = decide(observation, memory)
+    decided = clock.perf_counter()
+    step = advance(scenario, flight, decision)
+    flown = clock.perf_counter()
+    return Leg(observation, decision, step, looked - started, decided - looked, flown - decided), memory
+
+
+def fly_legs(scenario: Scenario, decide: Decide[Memory], memory: Memory) -> Iterator[Leg]:
+    """Look, decide, fly on, until the episode ends: one leg after another.
 
     Raises:
         ValueError: flights end on the target plane, and a decision's site is not on it.
     """
     flight, ended = begin_flight(scenario), False
     while not ended:
-        started = clock.perf_counter()
-        observation = observe(scenario, flight)
-        looked = clock.perf_counter()
-        decision, memory = decide(observation, memory)
-        decided = clock.perf_counter()
-        step = advance(scenario, flight, decision)
-        flown = clock.perf_counter()
-        yield Leg(observation, decision, step, looked - started, decided - looked, flown - decided)
-        flight, ended = step.flight, step.outcome is not None
+        leg, memory = fly_leg(scenario, flight, decide, memory)
+        yield leg
+        flight, ended = leg.step.flight, leg.step.outcome is not None
 
 
 def inform_pilot(policy: Policy[Any] | PrivilegedPolicy, scenario: Scenario) -> Policy[Any]:
@@ -246,6 +251,16 @@ def _check_answer(name: str, answer: object) -> tuple[Decision, Any]:
     return decision, memory
 
 
+def begin_decisions(policy: Policy[Any] | PrivilegedPolicy, scenario: Scenario) -> tuple[Decide[Any], Any]:
+    """How a policy decides in an episode, with its answers checked, and its memory before the first look."""
+    pilot = inform_pilot(policy, scenario)
+
+    def decide(observation: Observation, memory: Any) -> tuple[Decision, Any]:
+        return _check_answer(policy.name, pilot.decide(observation, memory))
+
+    return decide, pilot.begin(scenario.view, scenario.streams.policy())
+
+
 def fly(policy: Policy[Any] | PrivilegedPolicy, scenario: Scenario) -> EpisodeRecord:
     """Fly one episode.
 
@@ -260,22 +275,5 @@ def fly(policy: Policy[Any] | PrivilegedPolicy, scenario: Scenario) -> EpisodeRe
         ValueError: the policy returns something that is not (Decision, memory), or a site off the target
             plane where flights end on it.
     """
-    pilot = inform_pilot(policy, scenario)
-
-    def decide(observation: Observation, memory: Any) -> tuple[Decision, Any]:
-        return _check_answer(policy.name, pilot.decide(observation, memory))
-
-    legs = tuple(fly_legs(scenario, decide, pilot.begin(scenario.view, scenario.streams.policy())))
-    outcome = legs[-1].step.outcome
-    assert outcome is not None
-    return EpisodeRecord(
-        policy=policy.name,
-        scenario=scenario,
-        observations=tuple(leg.observation for leg in legs),
-        decisions=tuple(leg.decision for leg in legs),
-        segments=tuple(leg.step.segment for leg in legs),
-        rewards=tuple(leg.step.reward for leg in legs),
-        outcome=outcome,
-        minimum_slant_angle=min(leg.step.slant_angle for leg in legs),
-        decision_time=np.array([leg.decision_time for leg in legs]),
-    )
+    decide, memory = begin_decisions(policy, scenario)
+    return join_legs(policy.name, scenario, tuple(fly_legs(scenario, decide, memory)))

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,6 +14,9 @@ from hda.flight.vehicle import Segment
 from hda.policy import Decision
 from hda.task.observation import Observation
 from hda.task.scenario import Scenario
+
+if TYPE_CHECKING:
+    from hda.flight.episode import Leg
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,3 +108,20 @@ class EpisodeRecord:
     def fallbacks(self) -> int:
         """Decisions that fell back from the policy's own law."""
         return sum(decision.status.is_fallback for decision in self.decisions)
+
+
+def join_legs(policy: str, scenario: Scenario, legs: Sequence[Leg]) -> EpisodeRecord:
+    """The record of a flight from its legs, the first to the one that ends the episode."""
+    outcome = legs[-1].step.outcome
+    assert outcome is not None
+    return EpisodeRecord(
+        policy=policy,
+        scenario=scenario,
+        observations=tuple(leg.observation for leg in legs),
+        decisions=tuple(leg.decision for leg in legs),
+        segments=tuple(leg.step.segment for leg in legs),
+        rewards=tuple(leg.step.reward for leg in legs),
+        outcome=outcome,
+        minimum_slant_angle=min(leg.step.slant_angle for leg in legs),
+        decision_time=np.array([leg.decision_time for leg in legs]),
+    )

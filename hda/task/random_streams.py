@@ -7,6 +7,10 @@ same episode meet the same noise at the same look, even if one of them draws mor
 SeedSequence reads a number as words of 32 bits, and pads two words with two zeros. A study seed of more words
 would run into the episode's: (2^32, 0) into (0, 1). It is therefore given as its first word, the episode, how
 many words follow, and these; the count is zero for the others, so that no two seeds share streams.
+
+A flight may be branched before any look (`EpisodeStreams.branch`): what chance does from there on comes from
+streams of the branch's own, what it decides for the whole episode stays. Such a seed gives its count with the
+highest bit set, then the branch; no seed has so many words.
 """
 
 from __future__ import annotations
@@ -22,8 +26,9 @@ from hda.navigation.sensor_errors import FixDraws, ReadingDraws, draw_fix, draw_
 from hda.sensing.scan_draws import ScanDraws, draw_scan
 from hda.task.look_noise import POOL, Words, draw_normals, draw_symmetric, draw_unit
 
-_SCENARIO, _SENSOR, _ACTUATOR, _POLICY, _NAVIGATION = range(5)
+_SCENARIO, _SENSOR, _ACTUATOR, _POLICY, _NAVIGATION, _ROULETTE = range(6)
 _WORD = 2**32
+_BRANCHED = 2**31
 
 
 @dataclass(frozen=True)
@@ -33,6 +38,7 @@ class EpisodeStreams:
     Attributes:
         study_seed: seed of the whole study, at least zero; of any size.
         episode: number of the episode within the study, at least zero and below 2^32.
+        branch: number of the branch of its flight, at least zero and below 2^32; 0 is the flight itself.
 
     Raises:
         ValueError: a field is not such a whole number.
@@ -40,29 +46,35 @@ class EpisodeStreams:
 
     study_seed: int
     episode: int
+    branch: int = 0
 
     def __post_init__(self) -> None:
         """Refuse what SeedSequence would refuse later, with a name."""
-        for name in ("study_seed", "episode"):
+        for name in ("study_seed", "episode", "branch"):
             value = getattr(self, name)
             if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 0:
                 raise ValueError(f"{name} must be a whole number of at least 0, got {value!r}")
-        if self.episode >= _WORD:
-            raise ValueError(f"episode must be below 2^32, got {self.episode!r}")
+        for name in ("episode", "branch"):
+            if getattr(self, name) >= _WORD:
+                raise ValueError(f"{name} must be below 2^32, got {getattr(self, name)!r}")
 
-    @property
-    def _entropy(self) -> list[int]:
-        """Words of the seed that all streams share."""
+    def _entropy(self, branch: int) -> list[int]:
+        """Words of the seed that all streams of a branch share."""
         entropy = [int(self.study_seed) % _WORD, int(self.episode)]
         rest = int(self.study_seed) // _WORD
-        if rest:
-            words = [rest >> shift & _WORD - 1 for shift in range(0, rest.bit_length(), 32)]
+        words = [rest >> shift & _WORD - 1 for shift in range(0, rest.bit_length(), 32)]
+        if branch:
+            entropy += [_BRANCHED | len(words), int(branch), *words]
+        elif rest:
             entropy += [len(words), *words]
         return entropy
 
     def _seed(self, *key: int) -> Words:
-        """Words of a seed as SeedSequence has them: the shared ones, filled up with zeros, then the key."""
-        entropy = self._entropy
+        """Words of a seed as SeedSequence has them: the shared ones, filled up with zeros, then the key.
+
+        A key of one word is that of the whole episode, which has no branches.
+        """
+        entropy = self._entropy(self.branch if len(key) > 1 else 0)
         return np.array([*entropy, *[0] * (POOL - len(entropy)), *key], dtype=np.uint32)
 
     def _generator(self, *key: int) -> np.random.Generator:
@@ -105,6 +117,10 @@ class EpisodeStreams:
     def site_fix(self, index: int) -> FixDraws:
         """All that chance does to the fix of the landing site in look `index`."""
         return draw_fix(self._generator(_NAVIGATION, index, 0))
+
+    def roulette(self) -> np.random.Generator:
+        """Stream that decides which branches of the flight go on; no flight draws from it."""
+        return self._generator(_ROULETTE)
 
     def map_is_missing(self, index: int, probability: float) -> bool:
         """Whether look `index` comes without a map."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -97,6 +97,21 @@ def view_of_preset(preset: Preset, nominal_target: Array) -> ScenarioView:
         criteria=preset.criteria,
         body=vehicle if isinstance(vehicle, RigidBody) else None,
     )
+
+
+def branch_scenario(scenario: Scenario, branch: int) -> Scenario:
+    """The same episode for a branch of its flight: what chance does from here on is the branch's own.
+
+    Ground, start, and what errs for the whole episode stay.
+
+    Args:
+        scenario: of the episode.
+        branch: number of the branch; 0 is the flight itself.
+
+    Raises:
+        ValueError: the number is negative, or none.
+    """
+    return replace(scenario, streams=replace(scenario.streams, branch=branch))
 
 
 def ground_point(scenario: Scenario, site: Array) -> Array:

@@ -170,3 +170,25 @@ def _words(number: int) -> list[str]:
     digits = f"{number:x}"
     digits = digits.zfill(-(-len(digits) // 8) * 8)
     return [digits[k : k + 8] for k in range(0, len(digits), 8)][::-1]
+
+
+@given(seed=st.integers(0, 2**70), episode=EPISODES, branch=st.integers(1, 2**32 - 1), k=st.integers(0, 20))
+def test_a_branch_draws_its_own_looks_and_shares_what_is_the_episodes(seed, episode, branch, k):
+    own, other = EpisodeStreams(seed, episode), EpisodeStreams(seed, episode, branch)
+    rest = [int(word, 16) for word in _words(seed)[1:]] if seed >= 2**32 else []
+    entropy = [seed & 0xFFFFFFFF, episode, 2**31 + len(rest), branch, *rest]
+    child = np.random.SeedSequence(entropy).spawn(3)[ACTUATOR].spawn(k + 1)[k]
+    assert other.thrust_error(k, 0.05) == np.random.default_rng(child).uniform(-0.05, 0.05)
+    assert other.thrust_error(k, 0.05) != own.thrust_error(k, 0.05)
+    assert other.look(k, 4).tobytes() != own.look(k, 4).tobytes()
+    for name in ("scenario", "policy", "navigation", "roulette"):
+        assert getattr(other, name)().random() == getattr(own, name)().random()
+    error = own.navigation_error(1.0, 1.0)
+    assert other.navigation_error(1.0, 1.0).tobytes() == error.tobytes()
+
+
+def test_a_branch_that_is_no_word_is_refused():
+    with pytest.raises(ValueError, match="branch must be below"):
+        EpisodeStreams(0, 0, 2**32)
+    with pytest.raises(ValueError, match="branch must be a whole number"):
+        EpisodeStreams(0, 0, -1)
