@@ -58,7 +58,12 @@ class Realism(RunOptions):
         figures: draw the figure.
     """
 
-    presets: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME ...")] = ("paper", "lidar", "navigated", "rigid-body")
+    presets: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME ...")] = (
+        "paper",
+        "lidar",
+        "navigated",
+        "rigid-body",
+    )
     episodes: int = 200
     explained: int = 12
     out: Path = Path("results/realism")

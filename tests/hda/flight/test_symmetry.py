@@ -85,7 +85,7 @@ def turned(scenario: Scenario, turn: Turn) -> Scenario:
     state, streams = scenario.initial_state, scenario.streams
     return replace(
         scenario,
-        streams=TurnedStreams(streams.study_seed, streams.episode, turn),
+        streams=TurnedStreams(streams.study_seed, streams.episode, turn=turn),
         tile=remade(scenario.tile, turn.grid),
         initial_state=State(turn.place(state.position), turn.vector(state.velocity), state.mass),
         nominal_target=turn.place(scenario.nominal_target),
