@@ -3,8 +3,8 @@
 The same episodes are flown in setting after setting: maps with noise, looks that are measured, a navigation
 filter, a body that must turn. table.md has the fall of success from setting to setting, paired, the
 propellant that it costs, and what `studies.failures` finds in the first episodes that a setting loses, each
-flown again. order.md has every pair of policies whose order changes, with the lead in each setting; order.csv
-has all pairs.
+flown again. order.md has every pair of policies whose order changes, with the lead in each setting: an order
+is decided by McNemar's test with Holm's correction and by tile. order.csv has all pairs.
 """
 
 from __future__ import annotations
@@ -156,7 +156,7 @@ def run_realism(options: Realism) -> list[LayerRow]:
 
 def list_changes(pairs: Sequence[PairRow]) -> list[PairRow]:
     """Pairs whose order at the end is not what it was, those that are reversed first."""
-    told = (Verdict.REVERSED, Verdict.NEW, Verdict.LOST)
+    told = (Verdict.REVERSED, Verdict.TURNED, Verdict.CONFIRMED, Verdict.LOST)
     return sorted((pair for pair in pairs if pair.verdict in told), key=lambda pair: told.index(pair.verdict))
 
 

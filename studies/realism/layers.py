@@ -13,6 +13,7 @@ from enum import StrEnum
 from itertools import combinations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hda.flight.episode_row import EpisodeRow
 from hda.registry import policy_entry
@@ -28,10 +29,11 @@ from studies.campaign.score import (
 )
 from studies.columns import Column, Output
 from studies.statistics.moments import collect_moments, mean_intervals
-from studies.statistics.paired import paired_ratio_interval
-from studies.statistics.ratios import Interval
+from studies.statistics.paired import holm_adjust, paired_ratio_interval
+from studies.statistics.ratios import Interval, count_pairs, mcnemar_count_p_value
 
 _NOTHING = Interval(math.nan, math.nan, math.nan)
+_CHANCE = 0.05  # of a false lead among all pairs of a setting
 
 
 @dataclass(frozen=True)
@@ -44,7 +46,8 @@ class LayerRow:
         score: every figure with its intervals.
         step: fall of the ratio of successes against the setting before, paired; nan in the first.
         fall: the same against the first setting.
-        price: rise of the propellant against the first setting [%], paired, clustered by tile; nan in it.
+        price: rise of the propellant against the first setting [%], over the episodes that succeed in both,
+            clustered by tile; nan in it.
         lost: episodes that succeed in the setting before and fail here; in the first, those that fail.
         causes: of the first of these, in words.
     """
@@ -66,9 +69,15 @@ def lost_episodes(before: Sequence[EpisodeRow] | None, rows: Sequence[EpisodeRow
 
 
 def propellant_rise(first: Sequence[EpisodeRow], rows: Sequence[EpisodeRow]) -> Interval:
-    """[%] what a setting costs in propellant, over the same episodes, clustered by tile."""
-    more = [row.propellant_percent - own.propellant_percent for own, row in zip(first, rows, strict=True)]
-    return mean_intervals(collect_moments(more, [row.tile for row in rows]), 0)[1]
+    """[%] what a setting costs in propellant, over the episodes that succeed in both, clustered by tile.
+
+    A flight that fails early burns little, so failed ones tell nothing. nan where none succeeds in both.
+    """
+    pairs = [(own, row) for own, row in zip(first, rows, strict=True) if own.success and row.success]
+    if not pairs:
+        return _NOTHING
+    more = [row.propellant_percent - own.propellant_percent for own, row in pairs]
+    return mean_intervals(collect_moments(more, [row.tile for _, row in pairs]), 0)[1]
 
 
 def describe_layer(
@@ -99,7 +108,8 @@ class Verdict(StrEnum):
     KEPT = "kept"
     REVERSED = "reversed"
     LOST = "no longer decided"
-    NEW = "decided only at the end"
+    TURNED = "decided only at the end, the other way"
+    CONFIRMED = "decided only at the end"
     NONE = "never decided"
 
 
@@ -112,7 +122,8 @@ class PairRow:
         other: the other.
         leads: by how much `better` leads in each setting, a ratio with its paired 95 % interval.
         fall: by how much more `better` falls than `other` from the first setting to the last: a ratio with
-            its 95 % interval, clustered by tile.
+            its 95 % interval, clustered by tile. nan where the first setting does not decide their order:
+            the luckier of two equal policies stands as `better`, and falls for no other reason.
         verdict: what becomes of their order.
     """
 
@@ -123,13 +134,27 @@ class PairRow:
     verdict: Verdict
 
 
-def judge_order(first: Interval, last: Interval) -> Verdict:
-    """What becomes of a lead whose estimate in the first setting is not negative."""
-    if first.low > 0.0:
-        if last.low > 0.0:
-            return Verdict.KEPT
-        return Verdict.REVERSED if last.high < 0.0 else Verdict.LOST
-    return Verdict.NEW if last.low > 0.0 or last.high < 0.0 else Verdict.NONE
+def judge_order(first: int, last: int) -> Verdict:
+    """What becomes of an order: 1 where `better` leads, -1 where `other` does, 0 where nothing is decided."""
+    if first == 0:
+        return {1: Verdict.CONFIRMED, -1: Verdict.TURNED, 0: Verdict.NONE}[last]
+    return {1: Verdict.KEPT, -1: Verdict.REVERSED, 0: Verdict.LOST}[first * last]
+
+
+def decide_leads(rows: Rows, pairs: Sequence[tuple[str, str]]) -> list[int]:
+    """Who leads in each pair of policies: 1 for the first, -1 for the second, 0 where chance explains it.
+
+    A lead counts where the exact McNemar test, corrected by Holm for all pairs, is below 5 %, and the
+    interval of the difference, clustered by tile, lies off zero.
+    """
+    counts = [count_pairs(_successes(rows[a]), _successes(rows[b])) for a, b in pairs]
+    adjusted = holm_adjust([mcnemar_count_p_value(one) for one in counts])
+    decided = []
+    for (a, b), p in zip(pairs, adjusted, strict=True):
+        lead = _tiled_mean(_successes(rows[a]) - _successes(rows[b]), rows[a])
+        sign = int(lead.low > 0.0) - int(lead.high < 0.0)
+        decided.append(sign if p < _CHANCE else 0)
+    return decided
 
 
 def compare_order(flown: Mapping[str, Rows]) -> list[PairRow]:
@@ -139,32 +164,43 @@ def compare_order(flown: Mapping[str, Rows]) -> list[PairRow]:
         flown: setting -> rows of each policy, from the first setting to the last.
     """
     layers = list(flown.values())
+    names = [name for name in layers[0] if not policy_entry(name).privileged]
+    hits = {name: sum(row.success for row in layers[0][name]) for name in names}
+    pairs = [(a, b) if hits[a] >= hits[b] else (b, a) for a, b in combinations(names, 2)]
+    if not pairs:
+        return []
+    first, last = decide_leads(layers[0], pairs), decide_leads(layers[-1], pairs)
     found = []
-    for pair in combinations([name for name in layers[0] if not policy_entry(name).privileged], 2):
-        hits = [sum(row.success for row in layers[0][name]) for name in pair]
-        better, other = pair if hits[0] >= hits[1] else pair[::-1]
+    for (better, other), was, stays in zip(pairs, first, last, strict=True):
         leads = tuple(_lead(layer[better], layer[other]) for layer in layers)
-        fall = extra_fall(layers[0], layers[-1], better, other)
-        found.append(PairRow(better, other, leads, fall, judge_order(leads[0], leads[-1])))
+        fall = _NOTHING if was == 0 else extra_fall(layers[0], layers[-1], better, other)
+        found.append(PairRow(better, other, leads, fall, judge_order(was, stays)))
     return found
 
 
+def _successes(rows: Sequence[EpisodeRow]) -> NDArray[np.int_]:
+    return np.array([row.success for row in rows], dtype=int)
+
+
 def _lead(better: Sequence[EpisodeRow], other: Sequence[EpisodeRow]) -> Interval:
-    return paired_ratio_interval([row.success for row in better], [row.success for row in other])
+    return paired_ratio_interval(_successes(better), _successes(other))
+
+
+def _tiled_mean(values: NDArray[np.int_], rows: Sequence[EpisodeRow]) -> Interval:
+    """Mean over episodes, clustered by tile; where all are equal nothing shows how tiles differ: no ends."""
+    if np.ptp(values) == 0:
+        return Interval(float(values[0]), math.nan, math.nan)
+    return mean_intervals(collect_moments(values, [row.tile for row in rows]), 0)[1]
 
 
 def extra_fall(first: Rows, last: Rows, policy: str, other: str) -> Interval:
     """By how much more a policy falls than another from one setting to another, episode by episode.
 
     Returns:
-        A ratio with its 95 % interval, clustered by tile.
+        A ratio with its 95 % interval, clustered by tile; without ends where it is the same on all episodes.
     """
-    falls = [
-        np.array([own.success - row.success for own, row in zip(first[name], last[name], strict=True)], float)
-        for name in (policy, other)
-    ]
-    tiles = [row.tile for row in last[policy]]
-    return mean_intervals(collect_moments(falls[0] - falls[1], tiles), 0)[1]
+    falls = [_successes(first[name]) - _successes(last[name]) for name in (policy, other)]
+    return _tiled_mean(falls[0] - falls[1], last[policy])
 
 
 LAYER_COLUMNS: tuple[Column[LayerRow], ...] = (
