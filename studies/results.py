@@ -79,9 +79,9 @@ RESULTS: dict[str, Result] = {
     "faults": Result("robustness.md", "studies.faults"),
     "measured": Result(
         "realism.md",
-        "studies.realism --presets paper lidar lidar-coarse --episodes 1000 --out results/measured",
+        "studies.realism --presets paper lidar lidar-coarse --episodes 500 --explained 8 --out results/measured",
     ),
-    "realism": Result("realism.md", "studies.realism --episodes 1000"),
+    "realism": Result("realism.md", "studies.realism --explained 6"),
     "rare-events": Result("rare-events.md", "studies.rare_events --effort 0.08 --whole 6000"),
     "rare-events-single-divert": Result(
         "rare-events.md",

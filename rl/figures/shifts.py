@@ -115,7 +115,7 @@ def draw_shifts(options: ShiftsFigure) -> Figure:
     left.set_ylabel("mean move of the target by a decision [m]")
     left.invert_xaxis()
     right.set_xlabel("height above the target [m]")
-    right.set_ylabel("share of the flights with their last move at or below")
+    right.set_ylabel("share with the last move at or below")
     for axes in (left, right):
         axes.grid(alpha=0.25)
     left.legend()
