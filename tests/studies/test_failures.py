@@ -23,13 +23,12 @@ from studies.failures import causes, command
 from studies.failures.causes import (
     Cause,
     Failure,
-    count_safe_cells,
     explain_failure,
     find_remedies,
     last_change,
-    read_pixels,
 )
 from studies.failures.command import Failures, read_study, show_failures
+from studies.failures.readings import count_safe_cells, read_pixels
 from studies.failures.table import describe_failure, write_markdown
 
 HARD = PRESETS["hard"]

@@ -65,7 +65,7 @@ def test_it_points_along_what_the_plan_asks_for_later():
     planned = np.column_stack([0.1 * np.arange(40.0), np.zeros(40), np.full(40, 3.0)])
     for lead, later in ((0.0, 0.5), (1.0, 0.7), (0.75, 0.65)):
         body = turning(lead)
-        aim_ahead(body, MASS * planned[5], planned, 5, 0.5)
+        aim_ahead(body, MASS * planned[5], planned, 5, 0.5, 0.0)
         np.testing.assert_allclose(body.aim, MASS * np.array([later, 0.0, 3.0]), rtol=1e-12)
 
 
@@ -73,14 +73,14 @@ def test_while_its_plan_coasts_it_turns_to_the_burn_that_follows():
     planned = np.zeros((60, 3))
     planned[30:] = [1.0, -0.5, 4.0]
     body = turning(1.0)
-    aim_ahead(body, np.zeros(3), planned, 2, 0.5)
+    aim_ahead(body, np.zeros(3), planned, 2, 0.5, 0.0)
     np.testing.assert_allclose(body.aim, MASS * planned[30], rtol=1e-12)
 
 
 def test_a_correction_leans_the_aim_and_none_of_it_is_upward():
     planned = np.tile([0.0, 0.0, 2.0], (60, 1))
     body = turning()
-    aim_ahead(body, MASS * np.array([0.2, -0.1, 5.0]), planned, 0, 0.5)
+    aim_ahead(body, MASS * np.array([0.2, -0.1, 5.0]), planned, 0, 0.5, 0.0)
     np.testing.assert_allclose(body.aim, MASS * np.array([0.2, -0.1, 2.0]), rtol=1e-12)
 
 
