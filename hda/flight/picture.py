@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -26,7 +26,7 @@ def save_flight(path: Path, record: EpisodeRecord) -> None:
 
     Of a rigid body `body_path` (n, 17) is kept too.
     """
-    arrays = {"time": record.time, "path": record.path, "thrust": record.thrust}
+    arrays: dict[str, Any] = {"time": record.time, "path": record.path, "thrust": record.thrust}
     arrays["sites"] = np.array([decision.site for decision in record.decisions])
     if record.body_path is not None:
         arrays["body_path"] = record.body_path
