@@ -22,7 +22,7 @@ from guidance.constants import MOON_GRAVITY
 from guidance.rigid_body.body import RigidBody
 from guidance.rigid_body.motion import turning_acceleration
 from guidance.rigid_body.quaternion import rotate
-from guidance.state import State
+from guidance.rigid_body.state import RigidState
 from guidance.tracking.reference import TrackingReference, make_reference
 from guidance.validation import finite_number, finite_vector
 
@@ -38,11 +38,12 @@ class TurningOptions:
     """What a smooth descent leaves to the feedback, and how it ends.
 
     Attributes:
-        thrust_margin: share of the greatest thrust.
+        thrust_margin: share of the greatest thrust that is left to the feedback.
         least_thrust: [m/s^2] thrust acceleration that it never goes below: without thrust there is no
             steering.
-        tilt_margin: share of the body's tilt limit.
-        turning_margin: share of the body's limit of rate, and of the acceleration that its torques give.
+        tilt_margin: share of the body's tilt limit that is left.
+        turning_margin: share of the body's limit of rate, and of the acceleration that its torques give, that
+            is left.
         terminal_time: [s] of the constant deceleration, upright.
         terminal_deceleration: [m/s^2] in it.
         longest: [s] of a flight.
@@ -105,8 +106,7 @@ def _evaluate(coefficients: Array, share: Array, order: int) -> Array:
 
 
 def plan_turning_descent(
-    state: State,
-    attitude: ArrayLike,
+    state: RigidState,
     site: ArrayLike,
     body: RigidBody,
     control_period: float,
@@ -116,8 +116,7 @@ def plan_turning_descent(
     """Plan a smooth descent to rest at a site.
 
     Args:
-        state: present state.
-        attitude: unit quaternion, scalar first, shape (4,).
+        state: present state; rates and engine are not read.
         site: [m] shape (3,).
         body: the vehicle.
         control_period: [s] time over which a thrust is held.
@@ -125,17 +124,22 @@ def plan_turning_descent(
         gravity: [m/s^2] shape (3,), along -z.
 
     Returns:
-        The descent at the control instants; None where no such flight keeps every limit.
+        The descent at the control instants; None where no such flight keeps every limit, or where the tank
+        does not pay for it to the ground.
 
     Raises:
-        ValueError: an argument is not finite, out of range or of the wrong shape.
+        ValueError: an argument is not finite or of the wrong shape, the control period is not above zero, or
+            gravity is not along -z.
     """
     down, place = finite_vector("gravity", gravity, 3), finite_vector("site", site, 3)
+    if down[0] != 0.0 or down[1] != 0.0 or down[2] >= 0.0:
+        raise ValueError(f"gravity must point along -z, got {down.tolist()}: turn the frame")
+    finite_number("control_period", control_period, above=0.0)
     last = max(1, round(options.terminal_time / control_period))
     speed = options.terminal_deceleration * last * control_period
     up = np.array([0.0, 0.0, 1.0])
     gate = place + 0.5 * speed * last * control_period * up
-    axis = rotate(attitude, up)
+    axis = rotate(state.attitude, up)
     start = state.position, state.velocity, np.array(_FIRST_THRUSTS)[:, None] * axis + down
     end = gate, -speed * up, options.terminal_deceleration * up
     longest = max(_SHORTEST, int(options.longest / control_period))
@@ -150,6 +154,7 @@ def plan_turning_descent(
     used = np.where(height.min(axis=0) < gate[2] - _BELOW, np.inf, used)
     cost = size.mean(axis=0) * time[:, None]
     payable = body.lander.exhaust_velocity * math.log(max(state.mass / body.lander.dry_mass, 1.0))
+    payable -= (options.terminal_deceleration - down[2]) * last * control_period  # from the gate on
     cost = np.where((used <= 1.0) & (cost < payable), cost, np.inf)
     best = np.unravel_index(int(np.argmin(cost)), cost.shape)
     if not np.isfinite(cost[best]):

@@ -36,7 +36,7 @@ class EpisodeRow:
         touchdown_speed_mps: speed at the target plane.
         propellant_percent: propellant burnt over propellant at the start.
         minimum_slant_angle_deg: least elevation of the lander seen from the target at decision instants.
-        maximum_thrust_n: greatest applied thrust.
+        maximum_thrust_n: greatest applied thrust (`EpisodeRecord.maximum_thrust`).
         reward: undiscounted sum.
         flight_time_s: from the start to the plane.
         decisions: number of looks.

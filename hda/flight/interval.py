@@ -160,7 +160,7 @@ def _fly_plan(
             acceleration -= gains.position_gain * miss
             acceleration -= gains.velocity_gain * drift
             commanded[k, axis] = path[k, 6] * acceleration / (1.0 + estimate)
-        aim_ahead(conditions.turning, commanded[k], reference.acceleration, k, period)
+        aim_ahead(conditions.turning, commanded[k], reference.acceleration, k, period, estimate)
         if limit_into(commanded[k], vehicle.min_thrust, vehicle.max_thrust, vehicle.pointing_limit):
             limited += 1
         flown, status = hold_period(path[k], commanded[k], conditions, path[k + 1])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -22,9 +22,15 @@ _LEAST_SHOWN = 130.0  # [m] half side of the ground that is shown, at least
 
 
 def save_flight(path: Path, record: EpisodeRecord) -> None:
-    """Keep a flight as NPZ without pickle: time, path (n, 7), thrust (n - 1, 3), sites (decisions, 3)."""
-    sites = np.array([decision.site for decision in record.decisions])
-    np.savez_compressed(path, time=record.time, path=record.path, thrust=record.thrust, sites=sites)
+    """Keep a flight as NPZ without pickle: time, path (n, 7), thrust (n - 1, 3), sites (decisions, 3).
+
+    Of a rigid body `body_path` (n, 17) is kept too.
+    """
+    arrays: dict[str, Any] = {"time": record.time, "path": record.path, "thrust": record.thrust}
+    arrays["sites"] = np.array([decision.site for decision in record.decisions])
+    if record.body_path is not None:
+        arrays["body_path"] = record.body_path
+    np.savez_compressed(path, **arrays)
 
 
 def draw_flight(record: EpisodeRecord) -> Figure:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from guidance.arrays import Array
+from guidance.rigid_body.quaternion import tilt_angle
 from hda.flight.outcome import Outcome, RewardTerms
 from hda.flight.vehicle import Segment
 from hda.policy import Decision
@@ -74,25 +75,56 @@ class EpisodeRecord:
         return self.path[:, 6]
 
     @property
+    def body_path(self) -> Array | None:
+        """Shape (n, 17), a body's states in the order of `guidance.rigid_body.state.SIZE`; or None."""
+        parts = [s.body_path for s in self.segments if s.body_path is not None]
+        if not parts:
+            return None
+        return np.concatenate([*(part[:-1] for part in parts), parts[-1][-1:]])
+
+    @property
     def commanded_thrust(self) -> Array:
-        """[N] shape (n - 1, 3), command within the vehicle's limits, held over each interval."""
+        """[N] shape (n - 1, 3), site frame, command within the vehicle's limits, held over each interval.
+
+        A rigid body gives what of it lies along its axis, with the engine's lag.
+        """
         return np.concatenate([s.commanded for s in self.segments])
 
     @property
     def thrust(self) -> Array:
-        """[N] shape (n - 1, 3), applied over each interval: the command with the thrust error."""
+        """[N] shape (n - 1, 3), site frame, applied over each interval.
+
+        Of a point mass it is the command with the thrust error, held. Of a rigid body it is a mean: its size
+        is what the burnt mass tells, its direction that of the velocity gained against gravity.
+        """
+        if self.body_path is not None:
+            return self._mean_thrust()
         return np.concatenate([s.commanded * (1.0 + s.thrust_error) for s in self.segments])
 
     @property
     def maximum_thrust(self) -> float:
-        """[N] greatest applied thrust."""
+        """[N] greatest applied thrust; of a rigid body the greatest at a node."""
+        if self.body_path is not None:
+            return float(np.linalg.norm(self.body_path[:, 14:17], axis=1).max())
         return float(np.sqrt((self.thrust**2).sum(axis=1).max()))
 
     @property
     def maximum_tilt(self) -> float:
-        """[rad] greatest angle of the thrust from the vertical while the engine burnt; 0 if it never did."""
+        """[rad] greatest angle of the thrust from the vertical while the engine burnt; 0 if it never did.
+
+        Of a rigid body the greatest angle of its axis at a node, whether the engine burnt or not.
+        """
+        if self.body_path is not None:
+            return max(float(tilt_angle(attitude)) for attitude in self.body_path[:, 6:10])
         east, north, up = self.commanded_thrust.T + 0.0  # no thrust reads as 0, and -0.0 as 0.0
         return float(np.arctan2(np.hypot(east, north), up).max())
+
+    def _mean_thrust(self) -> Array:
+        preset, time = self.scenario.preset, np.diff(self.time)
+        gained = np.diff(self.velocity, axis=0) - time[:, None] * np.array(preset.gravity)
+        impulse = -np.diff(self.mass) * preset.lander.exhaust_velocity
+        scale = np.linalg.norm(gained, axis=1) * time
+        return gained * np.divide(impulse, scale, out=np.zeros_like(scale), where=scale > 0.0)[:, None]
 
     @property
     def pointing_limited(self) -> int:

@@ -25,6 +25,7 @@ from hda.policies.hazard_aware import HazardAwareSite, fuse_look, judge_ground, 
 from hda.policies.landing_dispersion import landing_probability
 from hda.policies.planned_descent import DescentMemory
 from hda.policies.site_price import HazardAwareWeights
+from hda.policies.turning_law import reversal_time
 from hda.policy import Decision, DecisionStatus
 from hda.task.observation import Observation, ScenarioView
 
@@ -154,7 +155,7 @@ class DeferredDecisionPolicy:
         belief = fuse_look(observation, memory.view, memory.belief)
         memory = replace(memory, belief=belief)
         height = float(observation.state.position[2] - observation.target[2])
-        if height <= 0.0 or (not first and observation.time_to_go <= self.options.commit_time):
+        if height <= 0.0 or (not first and observation.time_to_go <= self._commit_time(memory.view)):
             return self._fly_to(observation.target, observation, replace(memory, committed=True))
         safe = judge_ground(belief)
         present = belief.cell(observation.target)
@@ -179,6 +180,11 @@ class DeferredDecisionPolicy:
                 commit_time=_NEVER,
             )
         )
+
+    def _commit_time(self, view: ScenarioView) -> float:
+        """[s] of time to go below which the site is kept: of a rigid body, what a divert takes."""
+        own = self.options.commit_time
+        return own if view.body is None else max(own, reversal_time(view.body))
 
     def _spread(self, observation: Observation) -> float:
         """[m] scatter of a landing, as the ranking counts it: of control, and of a filter if there is one."""

@@ -37,7 +37,7 @@ from hda.task.observation import Observation, ScenarioView
 from hda.task.rules import Rules
 
 _WIDEST_SPREAD = 1.0  # [m] 2.5 of it are the half width over which the price averages
-_TURN_PRICE = 0.5  # [kg] that a change of site costs a body which must turn again, on tuning episodes or more
+_TURN_PRICE = 0.5  # [kg] that a change of site costs a body, which must turn again; chosen
 _SQUARE = 1.25  # half side of the belief's square in widths of the first look
 
 

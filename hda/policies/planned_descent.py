@@ -16,7 +16,7 @@ from guidance.tracking.reference import TrackingReference
 from guidance.tracking.regulator import DEFAULT_WEIGHTS, TrackingWeights, tracking_gains
 from guidance.tracking.retarget import shift_landing_point
 from guidance.tracking.soft_landing import DEFAULT_OPTIONS, SoftLanding, SoftLandingOptions, plan_soft_landing
-from hda.policies.turning_law import TurningLaw
+from hda.policies.turning_law import TurningLaw, load_smooth_planner
 from hda.policies.zem_zev import FixedGainZemZev
 from hda.policy import Command, DecisionStatus, PlanCommand
 from hda.task.observation import Observation, ScenarioView
@@ -64,6 +64,8 @@ class PlannedDescent:
         """No plan yet; the planner is made ready here, so that the first decision does not wait for it."""
         if view.body is None:
             _load_planner(self.options_for(view), self.weights, view.control_period)
+        else:
+            load_smooth_planner(self.turning, view.control_period)
         return DescentMemory(view)
 
     def command(

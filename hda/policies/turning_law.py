@@ -1,13 +1,17 @@
-"""How planned guidance flies a lander that must turn: smooth descents, gentle feedback, no late divert."""
+"""How planned guidance flies a lander that must turn: smooth descents, and gentle feedback."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import lru_cache
+
+import numpy as np
 
 from guidance.arrays import Array
-from guidance.rigid_body.body import RigidBody
+from guidance.rigid_body.body import DEFAULT_BODY, RigidBody
 from guidance.rigid_body.motion import turning_acceleration
+from guidance.rigid_body.state import RigidState
 from guidance.tracking.reference import TrackingReference
 from guidance.tracking.regulator import TrackingWeights, tracking_gains
 from guidance.tracking.turning_descent import DEFAULT_TURNING, TurningOptions, plan_turning_descent
@@ -40,14 +44,28 @@ class TurningLaw:
         """A smooth descent from the present attitude; None where there is none within the limits."""
         if view.body is None or observation.attitude is None:
             return None
-        state, attitude = observation.state, observation.attitude
-        start = state, attitude, site, view.body, view.control_period
-        return plan_turning_descent(*start, self.options, view.gravity)
+        seen = observation.state
+        state = RigidState(seen.position, seen.velocity, seen.mass, observation.attitude)
+        return plan_turning_descent(state, site, view.body, view.control_period, self.options, view.gravity)
 
     def command(self, reference: TrackingReference, period: float) -> PlanCommand:
         """Track a descent with control periods of `period` [s]."""
         across, upward = tracking_gains(period, self.across), tracking_gains(period, self.upward)
         return PlanCommand(reference, upward, lateral_gains=across, lead=self.lead)
+
+
+@lru_cache(maxsize=8)
+def load_smooth_planner(law: TurningLaw, period: float) -> None:
+    """Plan once per process, so that the first decision does not wait for compiled code.
+
+    Args:
+        law: makes the plans.
+        period: [s] between two control instants.
+    """
+    state = RigidState(np.array([200.0, 100.0, 900.0]), np.array([-8.0, -4.0, -30.0]), 1200.0)
+    reference = plan_turning_descent(state, np.zeros(3), DEFAULT_BODY, period, law.options)
+    if reference is not None:
+        law.command(reference, period)
 
 
 def reversal_time(body: RigidBody) -> float:

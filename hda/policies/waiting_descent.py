@@ -35,7 +35,8 @@ class WaitingDescent:
     While no more than `look_time` is left of the flight and nothing was seen, each look plans a landing one
     decision interval later than the last plan: the next look comes as long before the landing as this one. It
     ends with the first map, or where the later plan would come to the gate with less than `reserve` of the
-    propellant on board. On a sensor that always brings a map it is `AdjustedDescent`.
+    propellant on board. On a sensor that always brings a map it is `AdjustedDescent`, and so it is for
+    a rigid body: the later plan is a point mass's, which no body follows.
 
     Attributes:
         adjusted: flies otherwise.
@@ -78,7 +79,7 @@ class WaitingDescent:
     ) -> TrackingReference | None:
         """A landing one decision interval after the last plan's; None where it is too early or too dear."""
         view, state, remaining = descent.view, observation.state, descent.reference
-        if remaining is None or remaining.duration > self.look_time:
+        if view.body is not None or remaining is None or remaining.duration > self.look_time:
             return None
         periods = remaining.thrust_acceleration.shape[0] + view.control_periods
         options = self.adjusted.planned.options_for(view)

@@ -53,12 +53,14 @@ class Preset:
             constant errors of `rules`.
         body: the lander as a rigid body that must turn to thrust elsewhere; None: a point mass. Its engine
             and tank are those of `lander`, whatever it names, and it leans no further than
-            `lander.pointing_limit`.
+            `lander.pointing_limit`. On the target plane (`PlaneTouchdown`) how it leans and turns at the
+            touchdown is not judged.
         attitude_loop: by which the body turns.
 
     Raises:
         ValueError: gravity does not point down, a start has no propellant or lies below the target plane,
-            flights end on real ground whose height no sensor measures, there are both a filter and constant
+            a body has no torque to lean with, flights end on real ground whose height no sensor measures,
+            there are both a filter and constant
             errors, or a navigation sensor is not read at a whole number of control periods.
     """
 
@@ -83,6 +85,10 @@ class Preset:
         finite_number("start.altitude", self.start.altitude.low, above=self.terrain.maximum_elevation)
         if self.stance is not None and not isinstance(self.lidar, RangingLidar):
             raise ValueError("touchdown on real ground needs a lidar that measures ranges")
+        if self.body is not None and min(self.body.torque_limit[:2]) <= 0.0:
+            raise ValueError(
+                f"a body that flies needs torque about x and y, torque_limit is {self.body.torque_limit}"
+            )
         constant = self.rules.navigation_position_error, self.rules.navigation_velocity_error
         if self.navigation is not None and any(constant):
             raise ValueError("navigation by a filter leaves no constant navigation errors in the rules")

@@ -23,23 +23,21 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
-from guidance.state import State
 from hda.flight.episode import fly
 from hda.flight.outcome import Ending
 from hda.flight.record import EpisodeRecord
 from hda.flight.touchdown_report import TouchdownFault
-from hda.policies.privileged.knowable_ground import KnowableGround
 from hda.sensing.lidar import Lidar
 from hda.sensing.ranging import RangingLidar
-from hda.task.observation import Observation
 from hda.task.presets import Preset
-from hda.task.scenario import Scenario, ground_point, true_heights
+from hda.task.scenario import ground_point
 from studies.campaign.monte_carlo import Study
+from studies.failures.readings import count_safe_cells, last_reading
 
 SAFE_READING = 0.5
-_SATURATED = 0.999  # of the greatest thrust
+_SATURATED = 0.999  # of the greatest thrust, by the command
+_LEANS = frozenset({TouchdownFault.TILT, TouchdownFault.TURN_RATE})
 
 
 class Cause(StrEnum):
@@ -55,6 +53,7 @@ class Cause(StrEnum):
     NO_PLAN = "hard touchdown: the planner gave no answer"
     SATURATED = "hard touchdown: the engine was at its limit in the last interval"
     LATE_DIVERT = "hard touchdown: the site changed in the last two looks"
+    LEANT = "it leaned or turned too far at the touchdown"
     HARD = "hard touchdown on an unhurried approach"
     STRIKE = "it struck the ground on its way to the site"
     TANK_EMPTY = "the tank ran dry"
@@ -94,78 +93,6 @@ class Failure:
     miss_m: float
     remedies: tuple[str, ...] = ()
     faults: tuple[str, ...] = ()
-
-
-def read_pixels(
-    scenario: Scenario, observation: Observation
-) -> tuple[NDArray[np.int_], NDArray[np.int_], NDArray[np.bool_]]:
-    """Cells that a look's pixels show: rows (n,), columns (n,), and which pixels (n, n) read the ground.
-
-    Row i of the look shows row rows[i] of the tile. A pixel too far from the vertical, outside the map, or in
-    a look without a map reads nothing; nor does one of a ranging LIDAR where Algorithm 1 has a hole.
-    """
-    error = scenario.navigation_error
-    aim = ground_point(scenario, observation.target)
-    position = observation.state.position - error[:3]
-    x, y = aim[0] + observation.pixel_offset, aim[1] + observation.pixel_offset
-    across = (x[None, :] - position[0]) ** 2 + (y[:, None] - position[1]) ** 2
-    limit = math.tan(scenario.preset.lidar.off_nadir_limit) * (position[2] - aim[2])
-    rows, columns = np.floor(y).astype(int), np.floor(x).astype(int)
-    height, width = scenario.tile.deterministic.shape
-    inside = ((rows >= 0) & (rows < height))[:, None] & ((columns >= 0) & (columns < width))[None, :]
-    read = (across <= limit * limit) & inside
-    if observation.ground is not None:
-        read &= observation.ground.known_map(observation.target, observation.width, rows.size)
-    elif isinstance(scenario.preset.lidar, Lidar) and scenario.preset.lidar.dropout > 0.0:
-        read &= observation.has_map
-    return rows, columns, read
-
-
-def count_safe_cells(record: EpisodeRecord) -> tuple[int, int]:
-    """(distinct truly safe cells that looks read, those of them within reach at such a look)."""
-    scenario = record.scenario
-    truth = scenario.tile.deterministic
-    seen: set[tuple[int, int]] = set()
-    reached: set[tuple[int, int]] = set()
-    for observation in record.observations:
-        rows, columns, read = read_pixels(scenario, observation)
-        where = np.argwhere(read)
-        cells = {(int(rows[i]), int(columns[j])) for i, j in where if truth[rows[i], columns[j]]}
-        seen |= cells
-        aim = ground_point(scenario, observation.target)
-        state = _true_state(scenario, observation.state)
-        ground = KnowableGround(
-            state, aim, observation.width, scenario.view, scenario.preset.rules.soft_speed
-        )
-        left = np.array(sorted(cells - reached), dtype=int).reshape(-1, 2)
-        heights = true_heights(scenario, left[:, 0], left[:, 1])
-        reached |= {
-            (row, column)
-            for (row, column), height in zip(left.tolist(), heights, strict=True)
-            if ground.within_reach(np.array([column + 0.5, row + 0.5, height]))
-        }
-    return len(seen), len(reached)
-
-
-def _true_state(scenario: Scenario, estimate: State) -> State:
-    """The state that the lander estimates so."""
-    error = scenario.navigation_error
-    return State(estimate.position - error[:3], estimate.velocity - error[3:], estimate.mass)
-
-
-def last_reading(record: EpisodeRecord) -> tuple[int, float, bool] | None:
-    """(look, reading, whether the pixel's own cell is safe) of the last look that read the final site."""
-    scenario, site = record.scenario, record.decisions[-1].site
-    for index in range(len(record.observations) - 1, -1, -1):
-        observation = record.observations[index]
-        pixel = observation.pixel(site)
-        if pixel is None:
-            continue
-        rows, columns, read = read_pixels(scenario, observation)
-        if read[pixel]:
-            safe = bool(scenario.tile.deterministic[rows[pixel[0]], columns[pixel[1]]])
-            return index, float(observation.safety_map[pixel]), safe
-    return None
 
 
 def last_change(record: EpisodeRecord) -> int:
@@ -232,6 +159,9 @@ def _find_cause(
 
 
 def _find_hard_cause(record: EpisodeRecord) -> Cause:
+    report = record.outcome.report
+    if report is not None and report.faults and _LEANS.issuperset(report.faults):
+        return Cause.LEANT
     if any(decision.status.is_fallback for decision in record.decisions[-2:]):
         return Cause.NO_PLAN
     limit = _SATURATED * record.scenario.preset.lander.max_thrust

@@ -10,8 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from guidance.rigid_body import DEFAULT_BODY
 from hda.flight.episode import fly
+from hda.flight.outcome import Ending
 from hda.flight.record import EpisodeRecord
+from hda.flight.touchdown_report import TouchdownFault
 from hda.registry import make_policy
 from hda.task.presets import PRESETS, Preset
 from hda.task.rules import Range
@@ -23,13 +26,12 @@ from studies.failures import causes, command
 from studies.failures.causes import (
     Cause,
     Failure,
-    count_safe_cells,
     explain_failure,
     find_remedies,
     last_change,
-    read_pixels,
 )
 from studies.failures.command import Failures, read_study, show_failures
+from studies.failures.readings import count_safe_cells, read_pixels
 from studies.failures.table import describe_failure, write_markdown
 
 HARD = PRESETS["hard"]
@@ -56,6 +58,50 @@ def test_read_pixels_are_those_of_the_sensor(error: float) -> None:
         where = np.nonzero(read)
         shown[where] = record.scenario.tile.probability[rows[where[0]], columns[where[1]]]
         assert np.array_equal(shown, observation.safety_map)
+
+
+@pytest.mark.parametrize("limit", [8.0, 20.0])
+def test_on_a_body_they_are_those_within_its_own_cone(limit: float) -> None:
+    """It leans, so that a cone about the vertical would give other pixels in some look."""
+    lidar = replace(HARD.lidar, noise=0.0, off_nadir_limit=math.radians(limit))
+    preset = replace(HARD, name="with-a-body", lidar=lidar, body=DEFAULT_BODY)
+    record = fly(make_policy("nearest-safe"), sample_scenario(preset, 1, 0))
+    turned = 0
+    for observation in record.observations:
+        rows, columns, read = read_pixels(record.scenario, observation)
+        shown = np.zeros(read.shape, dtype=np.float32)
+        where = np.nonzero(read)
+        shown[where] = record.scenario.tile.probability[rows[where[0]], columns[where[1]]]
+        assert np.array_equal(shown, observation.safety_map)
+        _, _, upright = read_pixels(record.scenario, replace(observation, attitude=None))
+        turned += not np.array_equal(read, upright)
+    assert turned > 0
+
+
+def test_on_a_body_that_measures_ranges_the_map_alone_tells_what_was_read() -> None:
+    lidar = replace(PRESETS["rigid-body"].lidar, off_nadir_limit=math.radians(5.7))
+    preset = replace(PRESETS["rigid-body"], name="fixed-sensor", lidar=lidar)
+    record = fly(make_policy("nearest-safe"), sample_scenario(preset, 1, 0))
+    for observation in record.observations:
+        rows, _, read = read_pixels(record.scenario, observation)
+        assert observation.ground is not None
+        known = observation.ground.known_map(observation.target, observation.width, rows.size)
+        assert not (read & ~known).any()
+        assert read.sum() > 0.9 * known.sum()  # all but those beyond the tile's edge
+
+
+def test_a_landing_that_leans_alone_is_told_so() -> None:
+    record = next(r for r in failures("single-divert", PRESETS["lidar"], 60) if r.outcome.report is not None)
+    report = record.outcome.report
+    assert report is not None
+    for faults, told in (
+        ((TouchdownFault.TILT,), True),
+        ((TouchdownFault.TILT, TouchdownFault.TURN_RATE), True),
+        ((TouchdownFault.TILT, TouchdownFault.VERTICAL_SPEED), False),
+    ):
+        ended = replace(record.outcome, ending=Ending.HARD_LANDING, report=replace(report, faults=faults))
+        cause = explain_failure(replace(record, outcome=ended)).cause
+        assert (cause is Cause.LEANT) == told
 
 
 def test_causes_fit_the_record() -> None:

@@ -1,9 +1,9 @@
 """A rigid body under a commanded thrust vector, with its events: plane or ground, and the empty tank.
 
 The attitude loop points and throttles anew in each of its periods, and the engine's error acts on what it
-commands. In each of them the way is looked at every 0.1 m and 0.05 s, so that a dip below the plane between
-two instants may be missed that is a few millimetres deep. The ground is touched as by the upright lander,
-however it leans; how it leans is judged at the touchdown.
+commands. The way is looked at every 0.1 m and 0.05 s, however long that period is, so that a dip below the
+plane between two instants may be missed that is a few millimetres deep. The ground is touched as by the
+upright lander, however it leans; how it leans is judged at the touchdown.
 """
 
 from __future__ import annotations
@@ -24,6 +24,8 @@ FLYING, TOUCHDOWN, TANK_EMPTY = 0, 1, 2
 """Where a period leaves the vehicle: `hda.flight.vehicle.FlightStatus` as plain numbers."""
 
 _STEP = 0.1  # [m] along the ground between two instants that are looked at
+_INSTANT = 0.05  # [s] between them at most
+_CURVING = 2.0  # [m/s^2] beside the thrust's, to be on the safe side; gravity bends the way to the other side
 _HALVINGS = 50
 
 
@@ -61,7 +63,8 @@ def _contact(state: Array, plane: float, footing: Footing | None) -> float:
 @compile_kernel
 def _may_touch(piece: _Piece, end: Array, time: float, plane: float, footing: Footing | None) -> bool:
     """Whether contact within a piece is possible: the way is at most a parabola's sag below its ends."""
-    sag = 0.125 * time * time * (2.0 + math.sqrt(piece.thrust[0, 2] ** 2 + end[16] ** 2) / end[13])
+    thrust = max(piece.start[16], piece.thrust[0, 2], end[16])  # a lag leads from the first to the second
+    sag = 0.125 * time * time * (_CURVING + thrust / end[13])
     lowest = min(piece.start[2], end[2]) - sag
     if footing is not None:
         speed = max(math.hypot(piece.start[3], piece.start[4]), math.hypot(end[3], end[4]))
@@ -81,7 +84,7 @@ def _find_contact(
     if not _may_touch(piece, state, time, plane, footing):
         return -1.0
     speed = max(math.hypot(piece.start[3], piece.start[4]), math.hypot(state[3], state[4]))
-    looks = max(2, math.ceil(speed * time / _STEP))
+    looks = max(2, math.ceil(time / _INSTANT - 1e-9), math.ceil(speed * time / _STEP))
     before = 0.0
     for k in range(looks + 1):
         reached = time * k / looks

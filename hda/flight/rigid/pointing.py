@@ -91,7 +91,9 @@ def _keep_upright(turning: Turning, vector: Array, remaining: float) -> None:
 
 
 @compile_kernel
-def aim_ahead(turning: Turning | None, commanded: Array, planned: Array, node: int, period: float) -> None:
+def aim_ahead(
+    turning: Turning | None, commanded: Array, planned: Array, node: int, period: float, estimate: float
+) -> None:
     """Point a body along the thrust that its plan will have by the time that it has turned.
 
     While the plan coasts the body turns to the burn that follows.
@@ -103,6 +105,8 @@ def aim_ahead(turning: Turning | None, commanded: Array, planned: Array, node: i
         planned: [m/s^2] shape (n, 3), thrust acceleration of the plan in its periods.
         node: number of the present period.
         period: [s].
+        estimate: error ratio of the engine that `commanded` makes up for; where the body points it is no
+            matter.
     """
     if turning is None:
         return
@@ -115,7 +119,7 @@ def aim_ahead(turning: Turning | None, commanded: Array, planned: Array, node: i
     share = min(max(ahead - first, 0.0), 1.0)
     for axis in range(2):
         then = (1.0 - share) * planned[first, axis] + share * planned[second, axis]
-        turning.aim[axis] = commanded[axis] + mass * (then - planned[node, axis])
+        turning.aim[axis] = commanded[axis] * (1.0 + estimate) + mass * (then - planned[node, axis])
     upward = (1.0 - share) * planned[first, 2] + share * planned[second, 2]
     turning.aim[2] = mass * max(upward, _LEAST_LIFT)
     _keep_upright(turning, turning.aim, (planned.shape[0] - node) * period)

@@ -30,7 +30,9 @@ class Turning(NamedTuple):
         loop: gains of the attitude loop.
         path: shape (m + 1, 17), the state at each control instant.
         engine: shape (3,): thrust [N] that the lander reckons with by its commands and the engine's lag, and
-            over the newest period the impulse [N s] that it reckons with and the one that it feels.
+            over the newest period the impulse [N s] that it reckons with and the one that it feels. At the
+            start of an interval the reckoned thrust is the true one, with the engine's error in it; that is
+            forgotten within some lags.
         aim: [N] shape (3,), site frame, along which the body points in the present period; its size is of no
             account.
         lead: [s] by which it points ahead of a plan.

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from guidance import State
@@ -31,9 +31,8 @@ def start_at(place: tuple[float, float, float, float]) -> State:
 
 
 def plan(state: State, attitude: np.ndarray = UPRIGHT, **options: float) -> TrackingReference | None:
-    return plan_turning_descent(
-        state, attitude, SITE, DEFAULT_BODY, PERIOD, replace(DEFAULT_TURNING, **options)
-    )
+    start = RigidState(state.position, state.velocity, state.mass, attitude)
+    return plan_turning_descent(start, SITE, DEFAULT_BODY, PERIOD, replace(DEFAULT_TURNING, **options))
 
 
 def angles_between(vectors: np.ndarray) -> np.ndarray:
@@ -47,8 +46,8 @@ def angles_between(vectors: np.ndarray) -> np.ndarray:
 def test_a_descent_joins_the_present_motion_to_rest_at_the_site(place, lean):
     state, attitude = start_at(place), attitude_along([*lean, 1.0])
     flown = plan(state, attitude)
-    if flown is None:
-        return
+    assume(flown is not None)
+    assert flown is not None
     np.testing.assert_allclose(flown.position[0], state.position, atol=1e-9)
     np.testing.assert_allclose(flown.velocity[0], state.velocity, atol=1e-9)
     np.testing.assert_allclose(flown.position[-1], SITE, atol=1e-9)
@@ -66,8 +65,8 @@ def test_a_descent_joins_the_present_motion_to_rest_at_the_site(place, lean):
 def test_its_thrust_keeps_size_lean_and_rate_of_turn(place, lean):
     state = start_at(place)
     flown = plan(state, attitude_along([*lean, 1.0]))
-    if flown is None:
-        return
+    assume(flown is not None)
+    assert flown is not None
     thrust = flown.thrust_acceleration
     size = np.linalg.norm(thrust, axis=1)
     assert size.max() <= 0.6 * DEFAULT_BODY.lander.max_thrust / state.mass * 1.02
@@ -103,7 +102,7 @@ def test_a_body_that_may_lean_less_pays_more():
         flown = plan(state, tilt_margin=margin)
         assert flown is not None
         costs.append(PERIOD * float(np.linalg.norm(flown.thrust_acceleration, axis=1).sum()))
-    assert costs[0] <= costs[1]
+    assert costs[0] < costs[1]
 
 
 def test_where_no_smooth_flight_keeps_the_limits_there_is_none():
@@ -119,3 +118,31 @@ def test_where_no_smooth_flight_keeps_the_limits_there_is_none():
 def test_options_that_mean_nothing_are_refused(wrong):
     with pytest.raises(ValueError, match=next(iter(wrong))):
         TurningOptions(**wrong)
+
+
+def test_a_plan_is_paid_to_the_ground():
+    """Of tanks from nearly empty on, only those get a plan that pay for its whole thrust."""
+    exhaust, dry = DEFAULT_BODY.lander.exhaust_velocity, DEFAULT_BODY.lander.dry_mass
+    place, velocity = SITE + np.array([30.0, -20.0, 300.0]), np.array([-3.0, 2.0, -20.0])
+
+    def cost_at(mass: float) -> float | None:
+        flown = plan(State(place, velocity, mass))
+        if flown is None:
+            return None
+        return PERIOD * float(np.linalg.norm(flown.thrust_acceleration, axis=1).sum())
+
+    costs = [(mass, cost_at(mass)) for mass in np.linspace(dry + 1.0, dry + 60.0, 119)]
+    paid = [(mass, cost) for mass, cost in costs if cost is not None]
+    assert 0 < len(paid) < len(costs)
+    for mass, cost in paid:
+        assert cost < exhaust * math.log(mass / dry) * 1.01
+
+
+def test_a_question_that_means_nothing_is_refused():
+    start = RigidState.parse(start_at((0.0, 0.0, 800.0, 20.0)))
+    for period in (0.0, -0.5, math.nan):
+        with pytest.raises(ValueError, match="control_period"):
+            plan_turning_descent(start, SITE, DEFAULT_BODY, period)
+    for gravity in ([0.0, 0.0, 1.62], [0.1, 0.0, -1.62]):
+        with pytest.raises(ValueError, match="along -z"):
+            plan_turning_descent(start, SITE, DEFAULT_BODY, PERIOD, gravity=gravity)

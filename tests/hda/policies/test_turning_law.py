@@ -14,7 +14,7 @@ from hda.flight.episode import begin_flight, observe
 from hda.policies.hazard_aware import HazardAwareSite
 from hda.policies.planned_descent import PlannedDescent
 from hda.policies.turning_law import TurningLaw, reversal_time
-from hda.policy import DecisionStatus, PlanCommand
+from hda.policy import DecisionStatus, PlanCommand, Policy
 from hda.task.scenario import sample_scenario
 
 
@@ -65,6 +65,18 @@ def test_a_site_is_kept_when_a_late_divert_comes_too_late():
     late = replace(look, time_to_go=0.9 * reversal_time(DEFAULT_BODY))
     site, _ = selection.select(late, memory)
     np.testing.assert_array_equal(site, look.target)
+
+
+def test_deferred_decision_too_keeps_its_site_when_a_divert_comes_too_late():
+    view, look = first_look("rigid-body")
+    policy = hda.make_policy("deferred-decision")
+    assert isinstance(policy, Policy)
+    _, memory = policy.decide(look, policy.begin(view, np.random.default_rng(0)))
+    late = replace(look, time_to_go=0.9 * reversal_time(DEFAULT_BODY))
+    decision, _ = policy.decide(late, memory)
+    np.testing.assert_array_equal(decision.site, look.target)
+    earlier, _ = policy.decide(replace(look, time_to_go=1.1 * reversal_time(DEFAULT_BODY)), memory)
+    assert not np.array_equal(earlier.site, look.target)
 
 
 @pytest.mark.slow

@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from guidance.rigid_body import DEFAULT_BODY
 from hda.flight.episode import fly
 from hda.flight.record import EpisodeRecord
 from hda.policies.adjusted_descent import AdjustedDescent
@@ -113,3 +114,15 @@ def test_a_wait_that_means_nothing_is_named() -> None:
         WaitingDescent(look_time=-0.1)
     with pytest.raises(ValueError, match="reserve"):
         WaitingDescent(reserve=1.1)
+
+
+def test_a_body_never_flies_the_later_plan_of_a_point_mass() -> None:
+    """Blind, with less than `look_time` to go, it goes on as planned: smoothly, as far as it had to go."""
+    scenario = scenario_of(blind_episodes(1)[0], DROPOUT)
+    flown = replace(scenario, preset=replace(scenario.preset, name="with-a-body", body=DEFAULT_BODY))
+    plain, waiting = fly_law(flown, AdjustedDescent()), fly_law(flown, WaitingDescent())
+    for one, other in zip(plain.segments, waiting.segments, strict=True):
+        np.testing.assert_array_equal(one.path, other.path)
+    assert len(fly_law(scenario, WaitingDescent()).segments) > len(
+        fly_law(scenario, AdjustedDescent()).segments
+    )

@@ -156,11 +156,32 @@ def test_a_tilt_that_it_does_not_know_of_tilts_its_thrust():
     np.testing.assert_allclose(up, [math.sin(0.02), 0.0, math.cos(0.02)], atol=3e-4)
 
 
-def test_the_loop_must_be_stable_at_its_period_and_its_periods_divide_the_control_period():
+def test_the_loop_must_be_stable_at_its_period():
     with pytest.raises(ValueError, match="stable loop"):
         AttitudeLoop(natural_frequency=15.0, period=0.1)
-    quick, slow = (ControlPeriods(0.5, 10, AttitudeLoop(period=period)) for period in (0.1, 0.11))
-    state, decision = standing(600.0, -20.0), Decision(SITE, ZemZevCommand(6.0, 2.0, 30.0))
-    for interval in (quick, slow):
-        flown = fly_over(state, decision, RigidBody(), Surroundings(GRAVITY), interval, FlightErrors())
-        np.testing.assert_allclose(np.diff(flown.time), 0.5, rtol=1e-12)
+
+
+@pytest.mark.parametrize("period", [0.1, 0.11, 0.3, 0.5])
+def test_whatever_the_loops_period_is_a_control_period_burns_its_own_time_of_propellant(period):
+    interval = ControlPeriods(0.5, 10, AttitudeLoop(0.5, period=period))
+    decision = Decision(SITE, hold(3000.0, 1200.0))
+    flown = fly_over(
+        standing(600.0), decision, RigidBody(engine_lag=0.2), Surroundings(GRAVITY), interval, FlightErrors()
+    )
+    impulse = 3000.0 * (0.5 - 0.2 * -math.expm1(-0.5 / 0.2))
+    assert 1200.0 - flown.path[1, 6] == pytest.approx(impulse / EXHAUST, rel=1e-5)
+
+
+@given(depth=st.floats(0.005, 0.035))
+def test_a_slow_loop_does_not_miss_a_dip_below_the_plane(depth):
+    """Braked from a sink so that it would turn back `depth` below the plane within one period of 0.5 s."""
+    upward = 8000.0 / 1200.0 - PULL
+    speed = 0.125 * upward  # it turns back after 0.125 s
+    height = 0.5 * speed**2 / upward - depth
+    interval = ControlPeriods(0.5, 10, AttitudeLoop(0.5, period=0.5))
+    decision = Decision(SITE, hold(8000.0, 1200.0))
+    state, body = standing(height, -speed), RigidBody(engine_lag=0.0)
+    flown = fly_over(state, decision, body, Surroundings(GRAVITY), interval, FlightErrors())
+    assert flown.status is FlightStatus.TOUCHDOWN
+    first = (speed - math.sqrt(speed**2 - 2.0 * upward * height)) / upward
+    assert flown.time[-1] == pytest.approx(first, abs=2e-3)

@@ -14,7 +14,7 @@ from guidance.rigid_body.attitude_loop import hold_thrust
 from guidance.rigid_body.quaternion import tilt_angle
 from guidance.zem_zev import ZemZevGains
 from hda.flight.rigid.pointing import aim_ahead, aim_along, leaning_time, righting_tilt, steer_across
-from hda.flight.rigid.turning import Turning, begin_turning, name_turning
+from hda.flight.rigid.turning import Turning, begin_turning, feel_engine, name_turning
 from hda.task.scenario import sample_scenario
 
 MASS = 1180.0
@@ -65,7 +65,7 @@ def test_it_points_along_what_the_plan_asks_for_later():
     planned = np.column_stack([0.1 * np.arange(40.0), np.zeros(40), np.full(40, 3.0)])
     for lead, later in ((0.0, 0.5), (1.0, 0.7), (0.75, 0.65)):
         body = turning(lead)
-        aim_ahead(body, MASS * planned[5], planned, 5, 0.5)
+        aim_ahead(body, MASS * planned[5], planned, 5, 0.5, 0.0)
         np.testing.assert_allclose(body.aim, MASS * np.array([later, 0.0, 3.0]), rtol=1e-12)
 
 
@@ -73,15 +73,43 @@ def test_while_its_plan_coasts_it_turns_to_the_burn_that_follows():
     planned = np.zeros((60, 3))
     planned[30:] = [1.0, -0.5, 4.0]
     body = turning(1.0)
-    aim_ahead(body, np.zeros(3), planned, 2, 0.5)
+    aim_ahead(body, np.zeros(3), planned, 2, 0.5, 0.0)
     np.testing.assert_allclose(body.aim, MASS * planned[30], rtol=1e-12)
 
 
 def test_a_correction_leans_the_aim_and_none_of_it_is_upward():
     planned = np.tile([0.0, 0.0, 2.0], (60, 1))
     body = turning()
-    aim_ahead(body, MASS * np.array([0.2, -0.1, 5.0]), planned, 0, 0.5)
+    aim_ahead(body, MASS * np.array([0.2, -0.1, 5.0]), planned, 0, 0.5, 0.0)
     np.testing.assert_allclose(body.aim, MASS * np.array([0.2, -0.1, 2.0]), rtol=1e-12)
+
+
+def test_what_it_knows_of_its_engine_does_not_turn_its_aim():
+    planned = np.column_stack([0.05 * np.arange(40.0), np.full(40, -0.3), np.full(40, 3.0)])
+    asked = planned[5] + np.array([0.2, -0.1, 0.4])
+    for estimate in (-0.1, 0.0, 0.05):
+        body = turning(1.5)
+        aim_ahead(body, MASS * asked / (1.0 + estimate), planned, 5, 0.5, estimate)
+        np.testing.assert_allclose(body.aim, MASS * np.array([0.6, -0.4, 3.0]), rtol=1e-12)
+
+
+@given(remaining=st.floats(0.1, 7.0))
+def test_near_the_touchdown_its_gains_are_those_of_twice_the_leaning_time(remaining):
+    site, seen = np.array([30.0, -20.0, 0.0]), np.array([10.0, 5.0, 300.0, 2.0, -1.0, -20.0, MASS])
+    body, out = turning(), np.zeros(3)
+    steer_across(body, seen, site, ZemZevGains(6.0, 2.0), remaining, out)
+    left = 2.0 * leaning_time(body)
+    for axis in range(2):
+        away, speed = site[axis] - seen[axis], seen[3 + axis]
+        assert out[axis] == pytest.approx(6.0 * away / left**2 - 4.0 * speed / left, rel=1e-12)
+
+
+def test_an_engine_that_hardly_burns_tells_nothing_of_its_error():
+    body = turning()
+    body.engine[:] = 0.0, 40.0, 44.0
+    assert feel_engine(body, 0.02, 0.5, 41.0) == 0.02
+    assert feel_engine(body, 0.02, 0.5, 40.0) == pytest.approx(0.1, rel=1e-12)
+    assert feel_engine(None, 0.02, 0.5, 41.0) == 0.5
 
 
 @given(remaining=st.floats(10.0, 60.0))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from guidance import Lander
 from guidance.rigid_body import DEFAULT_BODY, AttitudeLoop, RigidBody, rotate
 from hda.flight.episode import begin_flight, fly_legs, observe
 from hda.flight.outcome import Outcome
+from hda.flight.picture import save_flight
 from hda.policy import Policy
 from hda.task.presets import PRESETS, Preset
 from hda.task.scenario import Scenario, sample_scenario
@@ -87,7 +89,52 @@ def test_a_record_holds_the_bodys_states_at_the_control_instants():
         assert before.body_path is not None
         assert after.body_path is not None
         np.testing.assert_allclose(before.body_path[-1], after.body_path[0], rtol=1e-15)
-    assert hda.fly(hda.make_policy("single-divert"), scenario).segments[0].body_path is None
+    assert record.body_path is not None
+    np.testing.assert_array_equal(record.body_path[:, [0, 1, 2, 3, 4, 5, 13]], record.path)
+    point = hda.fly(hda.make_policy("single-divert"), scenario)
+    assert point.body_path is point.segments[0].body_path is None
+
+
+def test_a_records_thrust_is_what_engine_and_attitude_gave():
+    """Its size is told by the burnt mass; between two nodes it lies near the mean of theirs.
+
+    The command does neither: it is asked for before the lag, and along another axis.
+    """
+    scenario = sample_scenario("rigid-body", 21, 0, split="tuning")
+    record = hda.fly(hda.make_policy("nearest-safe+convex"), scenario)
+    states, time = record.body_path, np.diff(record.time)
+    assert states is not None
+    nodes = np.array([rotate(state[6:10], state[14:17]) for state in states])
+    between = 0.5 * (nodes[1:] + nodes[:-1])
+    told = np.median(np.linalg.norm(record.thrust - between, axis=1))
+    asked = np.median(np.linalg.norm(record.commanded_thrust - between, axis=1))
+    assert told < 0.5 * asked
+    impulse = float(np.linalg.norm(record.thrust, axis=1) @ time)
+    burnt = (record.mass[0] - record.mass[-1]) * scenario.preset.lander.exhaust_velocity
+    assert impulse == pytest.approx(burnt, rel=1e-9)
+    sizes = np.linalg.norm(nodes, axis=1)
+    assert record.maximum_thrust == pytest.approx(sizes.max(), rel=1e-12)
+    up = np.array([0.0, 0.0, 1.0])
+    leans = [float(rotate(state[6:10], up) @ up) for state in states]
+    assert math.cos(record.maximum_tilt) == pytest.approx(min(leans), abs=1e-12)
+
+
+def test_a_kept_flight_has_the_bodys_states(tmp_path: Path):
+    for preset in ("rigid-body", "navigated"):
+        record = hda.fly(hda.make_policy("no-divert"), sample_scenario(preset, 21, 0, split="tuning"))
+        save_flight(tmp_path / f"{preset}.npz", record)
+    with np.load(tmp_path / "rigid-body.npz") as kept:
+        assert kept["body_path"].shape == (len(kept["time"]), 17)
+        np.testing.assert_array_equal(kept["body_path"][:, 13], kept["path"][:, 6])
+    with np.load(tmp_path / "navigated.npz") as kept:
+        assert "body_path" not in kept
+
+
+@pytest.mark.parametrize("torque", [(0.0, 66.0, 66.0), (66.0, 0.0, 66.0), (0.0, 0.0, 0.0)])
+def test_a_body_that_nothing_leans_is_refused_where_it_would_fly(torque: tuple[float, float, float]):
+    with pytest.raises(ValueError, match="needs torque about x and y"):
+        replace(PRESETS["rigid-body"], body=replace(DEFAULT_BODY, torque_limit=torque))
+    assert replace(PRESETS["paper"], body=replace(DEFAULT_BODY, torque_limit=(1.0, 1.0, 0.0))).vehicle
 
 
 def test_equal_episodes_are_equal_to_the_byte():
