@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -24,6 +25,7 @@ from rl.environment.native.vector_snapshot import restore_snapshot, take_snapsho
 from rl.environment.thrust.thrust_action import REACH, thrust_acceleration
 from rl.environment.thrust.thrust_env import LunarHDAThrustEnv
 from rl.environment.thrust.thrust_vector_env import LunarHDAThrustVectorEnv
+from rl.inference.artefacts import Artefact
 from rl.inference.networks import Perceptron
 from rl.policies.actor import actor_from_artefact
 from rl.policies.thrust_actor import ThrustActor
@@ -152,10 +154,6 @@ def small_actor(scale: float) -> tuple[ThrustActor, Perceptron]:
         "layer.1.weight": rng.normal(0.0, scale, (8, 5)).astype(np.float32),
         "layer.1.bias": np.array([0.0, 0.0, 0.05, 0.3, -0.2], np.float32),
     }
-    from pathlib import Path
-
-    from rl.inference.artefacts import Artefact
-
     recipe = replace(RECIPES["ppo-thrust"], hidden=(8,))
     actor = actor_from_artefact(Artefact("actor", tensors, actor_card(recipe)), Path("small"))
     assert isinstance(actor, ThrustActor)
