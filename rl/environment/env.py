@@ -207,11 +207,11 @@ class LandingEnv(gymnasium.Env[ObsType, Array32], Generic[ObsType]):
         """
         if self.render_mode is None:
             return None
-        if self.scenario is None or self._observation is None:
+        if self.scenario is None or self._observation is None or self._now is None:
             raise gymnasium.error.ResetNeeded("nothing to render: call reset()")
         from rl.environment.rendering import render_flight
 
-        return render_flight(self.scenario, self.steps, self._observation, self._now or self._observation)
+        return render_flight(self.scenario, self.steps, self._observation, self._now)
 
     def _look(self, flight: Flight) -> tuple[ObsType, dict[str, Any]]:
         """Take the look of this instant: the encoded observation, and the episode's numbers."""
