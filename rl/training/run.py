@@ -99,8 +99,8 @@ def make_environment(
     if isinstance(settings, OnPolicySettings):
         if (settings.sight, settings.guidance) != ("look", "zem-zev"):
             raise ValueError(
-                f"{settings.algorithm} learns with sight look and guidance zem-zev or thrust, got"
-                f" {settings.sight} and {settings.guidance}: take td3-belief, td3-convex or td3-belief-convex"
+                f"{settings.algorithm} does not learn with sight {settings.sight} and guidance"
+                f" {settings.guidance}: take td3-belief, td3-convex or td3-belief-convex"
             )
         return LunarHDAVectorEnv(settings.environments, preset=preset, **options)
     return LunarHDAEnv(preset, **options)

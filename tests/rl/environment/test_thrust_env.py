@@ -12,6 +12,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env as gymnasium_check
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from matplotlib.axes import Axes
 from stable_baselines3.common.env_checker import check_env as sb3_check
 
 import rl  # noqa: F401 - registers the environments
@@ -215,15 +216,13 @@ def test_with_an_engine_that_does_not_err_the_policy_flies_what_the_agent_does(s
 
 
 def test_a_picture_between_looks_shows_this_instant(monkeypatch):
-    from matplotlib.axes import Axes
-
     titles, crosses = [], []
 
     def set_title(axes: Axes, text: str) -> None:
         titles.append(text)
 
     def plot(axes: Axes, *arguments: Any, **options: Any) -> None:
-        if arguments[-1] == "+":
+        if str(arguments[-1]) == "+":
             crosses.append(arguments[:2])
 
     monkeypatch.setattr(Axes, "set_title", set_title)

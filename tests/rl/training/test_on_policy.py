@@ -20,6 +20,7 @@ from rl.learning.algorithms import make_algorithm
 from rl.policies.actor import AgentPolicy
 from rl.policies.recurrent_actor import RecurrentAgentPolicy, memory_actor_from_artefact
 from rl.settings import ON_POLICY_RECIPES, RECIPES, OnPolicySettings, settings_from_json
+from rl.train import _AGENTS
 from rl.training.actor_export import actor_card, actor_tensors
 from rl.training.candidates import Choice
 from rl.training.export import ExportWeights, run_export
@@ -166,7 +167,7 @@ def test_thrust_goes_with_looks_and_without_memory(tmp_path):
 def test_proximal_policies_refuse_what_no_batch_serves_and_name_the_recipes_that_learn_it(
     name, changes, tmp_path
 ):
-    with pytest.raises(ValueError, match=f"{name} learns with sight look .* take td3-belief, td3-convex"):
+    with pytest.raises(ValueError, match=f"{name} does not learn with sight .*: take td3-belief, td3-convex"):
         run_training(tmp_path, PAPER, replace(SMALL[name], **changes), plan(name, 48), resume=False)
     assert not any(tmp_path.iterdir())
 
@@ -185,8 +186,6 @@ def test_no_run_goes_on_where_the_learning_rate_is_zero(name, tmp_path):
 
 
 def test_every_recipe_learns_for_all_steps_of_its_command():
-    from rl.train import _AGENTS
-
     for command in _AGENTS:
         options = command.__metadata__[0].default
         options.settings.refuse_steps(options.steps)
