@@ -45,7 +45,7 @@ class TrainingOptions:
         seed: of the first weights, the exploration and the episodes.
         out: folder of the run; runs/NAME-SEED by default.
         preset: setting to fly.
-        steps: environment steps.
+        steps: environment steps; not beyond the end of a decay of the learning rate to 0.
         resume: go on from the newest checkpoint in the folder.
         validate_every: steps between validations.
         validation_episodes: episodes of each validation.
@@ -94,7 +94,8 @@ class TrainOnPolicyAgent(TrainingOptions):
 
     Attributes:
         settings: what is learnt.
-        steps: environment steps of all environments together, rounded up to whole updates.
+        steps: environment steps of all environments together, rounded up to whole updates. The learning rate
+            comes to 0 at the end of `learning_rate_decay`: for more steps, lengthen it too.
     """
 
     settings: tyro.conf.OmitArgPrefixes[OnPolicySettings] = ON_POLICY_RECIPES["ppo"]
@@ -107,7 +108,8 @@ class TrainRecurrentOnPolicyAgent(TrainingOptions):
 
     Attributes:
         settings: what is learnt.
-        steps: environment steps of all environments together, rounded up to whole updates.
+        steps: environment steps of all environments together, rounded up to whole updates. The learning rate
+            comes to 0 at the end of `learning_rate_decay`: for more steps, lengthen it too.
     """
 
     settings: tyro.conf.OmitArgPrefixes[RecurrentOnPolicySettings] = RECURRENT_PPO_SETTINGS

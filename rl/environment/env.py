@@ -31,7 +31,7 @@ ObsType = TypeVar("ObsType")
 
 
 class LandingEnv(gymnasium.Env[ObsType, Array32], Generic[ObsType]):
-    """What the two environments share.
+    """What the environments share; a subclass says where its actions and steps are others.
 
     **Action**, Box(-1, 1, (5,), float32), linear between the ends:
 
@@ -70,8 +70,8 @@ class LandingEnv(gymnasium.Env[ObsType, Array32], Generic[ObsType]):
     The objects behind them are `env.unwrapped.outcome` (None in flight), `.steps` and `.scenario`.
 
     **Many at a time**: `gymnasium.make_vec` (`rl.environment.native.vector_env.LandingVectorEnv`).
-    `gymnasium.make` truncates after 20 steps, as the rules of every preset do; for rules that allow more pass
-    it `max_episode_steps`.
+    `gymnasium.make` truncates after 20 decisions, as the rules of every preset do; for rules that allow more
+    pass it `max_episode_steps`.
 
     **Worker processes** that have not imported `rl` know the environments as `"rl:LunarHDA-v0"` and
     `"rl:LunarHDA-Map-v0"`: Gymnasium imports what stands before the colon.
@@ -119,7 +119,8 @@ class LandingEnv(gymnasium.Env[ObsType, Array32], Generic[ObsType]):
         self.scenario: Scenario | None = None
         self.steps: list[Step] = []
         self._flight: Flight | None = None
-        self._observation: Observation | None = None
+        self._observation: Observation | None = None  # at the last look
+        self._now: Observation | None = None
         self._steered: Any = None
 
     @cached_property
@@ -176,7 +177,7 @@ class LandingEnv(gymnasium.Env[ObsType, Array32], Generic[ObsType]):
         """Fly one decision.
 
         Raises:
-            ValueError: the action is not five finite numbers.
+            ValueError: the action is not as many finite numbers as the action space has.
             gymnasium.error.ResetNeeded: no episode is under way.
         """
         scenario, flight, look = self.scenario, self._flight, self._observation
@@ -206,17 +207,17 @@ class LandingEnv(gymnasium.Env[ObsType, Array32], Generic[ObsType]):
         """
         if self.render_mode is None:
             return None
-        if self.scenario is None or self._observation is None:
+        if self.scenario is None or self._observation is None or self._now is None:
             raise gymnasium.error.ResetNeeded("nothing to render: call reset()")
         from rl.environment.rendering import render_flight
 
-        return render_flight(self.scenario, self.steps, self._observation)
+        return render_flight(self.scenario, self.steps, self._observation, self._now)
 
     def _look(self, flight: Flight) -> tuple[ObsType, dict[str, Any]]:
         """Take the look of this instant: the encoded observation, and the episode's numbers."""
         assert self.scenario is not None
         self._flight = flight
-        self._observation = observe(self.scenario, flight)
+        self._observation = self._now = observe(self.scenario, flight)
         seen = self.encode(self._observation)
         return seen, describe_episode(self.scenario, flight, self.steps)
 

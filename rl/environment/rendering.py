@@ -19,13 +19,16 @@ _DPI = 64
 _HALF_SIDE = 270.0  # [m] of the ground around the first target: every start of the paper's lies in it
 
 
-def render_flight(scenario: Scenario, steps: Sequence[Step], observation: Observation) -> NDArray[np.uint8]:
+def render_flight(
+    scenario: Scenario, steps: Sequence[Step], look: Observation, now: Observation
+) -> NDArray[np.uint8]:
     """Draw the flight so far.
 
     Args:
         scenario: what is flown.
         steps: what has been flown.
-        observation: the present look.
+        look: the last one.
+        now: what is known at this instant; the look, if it was taken now.
 
     Returns:
         RGB picture, shape (320, 640, 3): the ground around the path on the left, the look on the right; of a
@@ -36,28 +39,28 @@ def render_flight(scenario: Scenario, steps: Sequence[Step], observation: Observ
 
     start = scenario.initial_state.position[None]
     path = np.concatenate([start, *(step.segment.path[1:, :3] for step in steps)])
-    panels = 2 if observation.ground is None else 3
+    panels = 2 if look.ground is None else 3
     figure = Figure((panels * _SIDE, _SIDE), dpi=_DPI, layout="constrained")
     canvas = FigureCanvasAgg(figure)
     axes = figure.subplots(1, panels)
     ground, seen = axes[:2]
     draw_true_safety(ground, scenario.tile)
-    draw_field_of_view(ground, observation)
+    draw_field_of_view(ground, look)
     ground.plot(path[:, 0], path[:, 1], color=COLORS[1])
-    ground.plot(*observation.target[:2], "+", color=COLORS[0], markersize=10)
-    half = 0.5 * observation.width
+    ground.plot(*now.target[:2], "+", color=COLORS[0], markersize=10)
+    half = 0.5 * look.width
     middle = scenario.nominal_target
     ground.set_xlim(middle[0] - _HALF_SIDE, middle[0] + _HALF_SIDE)
     ground.set_ylim(middle[1] - _HALF_SIDE, middle[1] + _HALF_SIDE)
-    height = path[-1, 2] - observation.target[2]
-    ground.set_title(f"true safety; t = {observation.time:.0f} s, {height:.0f} m above the target")
+    height = path[-1, 2] - now.target[2]
+    ground.set_title(f"true safety; t = {now.time:g} s, {height:.0f} m above the target")
     seen.imshow(
-        observation.safety_map, cmap="gray", origin="lower", vmin=0, vmax=1, extent=(-half, half, -half, half)
+        look.safety_map, cmap="gray", origin="lower", vmin=0, vmax=1, extent=(-half, half, -half, half)
     )
-    seen.plot(0, 0, "+", color=COLORS[0], markersize=10)
+    seen.plot(*(now.target - look.target)[:2], "+", color=COLORS[0], markersize=10)
     seen.set_title("look: observed safety about the target [m]")
-    if observation.ground is not None:
-        draw_elevation(axes[2], observation)
+    if look.ground is not None:
+        draw_elevation(axes[2], look)
         axes[2].set_title("measured heights; orange: holes")
     canvas.draw()
     return np.asarray(canvas.buffer_rgba())[:, :, :3].copy()

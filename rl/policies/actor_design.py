@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -20,7 +21,7 @@ from rl.inference.arrays import Array32
 from rl.inference.artefacts import ArtefactError, require
 from rl.inference.latent import encoder_of_card, load_encoder
 from rl.inference.networks import MapEncoder
-from rl.settings import ON_POLICY_ALGORITHMS
+from rl.settings import ALGORITHMS, ON_POLICY_ALGORITHMS, refuse_thrust
 
 THRUST = "thrust"
 """The guidance of an agent that gives the thrust itself."""
@@ -64,7 +65,8 @@ class ActorDesign:
         """Read it; `path` is named in messages.
 
         Raises:
-            ArtefactError: it was made for another encoding or another autoencoder, or a field is wrong.
+            ArtefactError: it was made for another encoding or another autoencoder, or a field is wrong, or
+                fields do not go together.
         """
         require(card, "encoding_version", ENCODING_VERSION, path)
         if not isinstance(card.get("layout"), str) or card["layout"] not in LAYOUTS:
@@ -77,11 +79,15 @@ class ActorDesign:
             raise ArtefactError(
                 f"{path}: the card's 'hidden' or 'action_ranges' is wrong: {error}"
             ) from error
-        names = str(card.get("sight", "look")), str(card.get("guidance", "zem-zev"))
-        for kind, name, known in zip(("sight", "guidance"), names, (SIGHTS, GUIDANCES), strict=True):
-            if name not in known:
-                raise ArtefactError(f"{path}: {unknown_name(kind, name, known)}")
-        return cls(LAYOUTS[card["layout"]], encoder, hidden, ranges, str(card.get("algorithm")), *names)
+        algorithm = _known_name(card, "algorithm", ALGORITHMS, path)
+        sight = _known_name({"sight": "look", **card}, "sight", SIGHTS, path)
+        guidance = _known_name({"guidance": "zem-zev", **card}, "guidance", GUIDANCES, path)
+        if guidance == THRUST:
+            try:
+                refuse_thrust(sight, algorithm)
+            except ValueError as error:
+                raise ArtefactError(f"{path}: {error}") from error
+        return cls(LAYOUTS[card["layout"]], encoder, hidden, ranges, algorithm, sight, guidance)
 
     @cached_property
     def sight(self) -> Sight:
@@ -101,6 +107,14 @@ class ActorDesign:
     def begin(self, view: ScenarioView) -> tuple[Any, Any]:
         """Memory of sight and steering before the first look."""
         return self.sight.begin(view), self.steering.begin(view)
+
+
+def _known_name(card: dict[str, Any], field: str, known: Iterable[str], path: Path) -> str:
+    """The name in a card's field, which is one of those known."""
+    name, names = card.get(field), tuple(known)
+    if name not in names:
+        raise ArtefactError(f"{path}: {unknown_name(field, name, names)}")
+    return str(name)
 
 
 def action_ranges_from_card(card: dict[str, object]) -> ActionRanges:

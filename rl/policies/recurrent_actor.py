@@ -16,10 +16,7 @@ from rl.inference.arrays import Array32
 from rl.inference.artefacts import Artefact, ArtefactError, load_artefact
 from rl.inference.recurrent_network import RecurrentNetwork, RecurrentSizes
 from rl.policies.actor_design import ActorDesign, bound_action
-from rl.settings import ON_POLICY_ALGORITHMS, WITH_MEMORY
-
-_HISTORY = {"td3-lstm": ("action",), "td3-lstm-plus": ("action", "reward"), "recurrent-ppo": ()}
-"""What the LSTM of an algorithm sees beside the observation."""
+from rl.settings import HISTORIES, ON_POLICY_ALGORITHMS
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,14 +89,16 @@ def memory_actor_from_artefact(artefact: Artefact, path: Path) -> MemoryActor:
     design, memory = ActorDesign.from_card(artefact.card, path), artefact.card.get("memory")
     if not isinstance(memory, int):
         raise ArtefactError(f"{path}: the card's 'memory' must be a whole number, got {memory!r}")
-    if design.algorithm not in WITH_MEMORY:
-        known = ", ".join(WITH_MEMORY)
-        raise ArtefactError(f"{path}: algorithm must be one of {known}, got {design.algorithm!r}")
+    if design.algorithm not in HISTORIES:
+        known = ", ".join(HISTORIES)
+        raise ArtefactError(
+            f"{path}: the card's 'algorithm' must be one with memory ({known}), got {design.algorithm!r}"
+        )
     sizes = RecurrentSizes(
         design.seen,
         memory,
         design.hidden,
-        _HISTORY[design.algorithm],
+        HISTORIES[design.algorithm],
         present=design.algorithm not in ON_POLICY_ALGORITHMS,
         actions=design.steering.size,
     )

@@ -75,6 +75,8 @@ class ThrustActor:
     def foretell(self, look: Observation, view: ScenarioView, clock: float) -> tuple[Array, Array]:
         """States at the control instants until one period after the next look, or the target plane.
 
+        What the next look will show is not known: the last period repeats the action before it.
+
         Args:
             look: of this instant.
             view: the scenario.
@@ -87,11 +89,13 @@ class ThrustActor:
         latent = design.encoder.encode(look.safety_map)
         now = replace(look, time_to_go=clock - look.time)
         states, site = [look.state.as_array()], look.target
+        action = np.zeros(len(THRUST_ACTIONS))
         for k in range(view.control_periods + 1):
-            age = np.array([k % view.control_periods / view.control_periods])
-            place = LookPlace(latent, age, look.target, np.array([look.width]))
-            vector = encode_thrust_flights(design.layout, seen_flight(now), view.nominal_target, place)
-            action = bound_action(self.network.evaluate(vector), design.algorithm).astype(np.float64)
+            if k < view.control_periods:
+                age = np.array([k / view.control_periods])
+                place = LookPlace(latent, age, look.target, np.array([look.width]))
+                vector = encode_thrust_flights(design.layout, seen_flight(now), view.nominal_target, place)
+                action = bound_action(self.network.evaluate(vector), design.algorithm).astype(np.float64)
             if k == 0:
                 site = site + site_shift(action, np.asarray(look.width), design.ranges.shift)
             thrust = states[-1][6] * thrust_acceleration(action, view.gravity)

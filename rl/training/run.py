@@ -18,7 +18,7 @@ from rl.inference.arrays import Array32
 from rl.inference.artefacts import library_versions
 from rl.learning.algorithms import make_algorithm
 from rl.learning.precision import matmul_precision
-from rl.settings import WITH_MEMORY, AgentSettings, OnPolicySettings, settings_from_json
+from rl.settings import AgentSettings, OnPolicySettings, refuse_thrust, settings_from_json
 from rl.training.actor_export import actor_card
 from rl.training.checkpoint import newest_checkpoint, restore_checkpoint
 from rl.training.run_folder import TrainingPlan, read_run
@@ -37,7 +37,8 @@ def run_training(
         resume: go on from the newest checkpoint in the folder, if there is one.
 
     Raises:
-        ValueError: the folder holds a run and `resume` is not set, or holds a run with other settings.
+        ValueError: the folder holds a run and `resume` is not set, or holds a run with other settings; the
+            settings do not go together; or the last steps would teach nothing.
     """
     import torch
 
@@ -52,6 +53,7 @@ def _train(folder: Path, preset: Preset, settings: AgentSettings, plan: Training
     from rl.training.recorder import Recorder
     from rl.training.vector_adapter import StableBaselinesVector
 
+    settings.refuse_steps(plan.steps)
     env = make_environment(settings, preset)  # refuses what cannot be learnt before a folder is made
     checkpoint = _open_folder(folder, preset, settings, plan, resume)
     flown = env if isinstance(env, LandingEnv) else StableBaselinesVector(env)
@@ -89,13 +91,17 @@ def make_environment(
     options: dict[str, Any] = {"layout": settings.layout, "action_ranges": settings.action_ranges}
     options["encoder"] = settings.encoder
     if settings.guidance == "thrust":
-        if settings.sight != "look" or settings.algorithm in WITH_MEMORY:
-            raise ValueError("guidance thrust goes with sight look, and with an agent without memory")
+        refuse_thrust(settings.sight, settings.algorithm)
         if isinstance(settings, OnPolicySettings):
             return LunarHDAThrustVectorEnv(settings.environments, preset=preset, **options)
         return LunarHDAThrustEnv(preset, **options)
     options |= {"sight": settings.sight, "guidance": settings.guidance}
     if isinstance(settings, OnPolicySettings):
+        if (settings.sight, settings.guidance) != ("look", "zem-zev"):
+            raise ValueError(
+                f"{settings.algorithm} does not learn with sight {settings.sight} and guidance"
+                f" {settings.guidance}: take td3-belief, td3-convex or td3-belief-convex"
+            )
         return LunarHDAVectorEnv(settings.environments, preset=preset, **options)
     return LunarHDAEnv(preset, **options)
 

@@ -31,6 +31,15 @@ def python_blocks(page: str) -> list[str]:
     return [dedent(block) for _, block in fences]
 
 
+def test_no_page_and_no_source_holds_marks_of_a_merge() -> None:
+    """Of all that git keeps, what was staged is read; a line of equals signs alone may underline a title."""
+    marks = r"^(<{7}|>{7}|[|]{7})( |$)"
+    found = subprocess.run(
+        ["git", "grep", "-n", "-I", "-E", marks], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert (found.returncode, found.stdout, found.stderr) == (1, "", "")
+
+
 @pytest.fixture
 def empty_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """An empty folder to run in, from which the repository's examples can be imported.

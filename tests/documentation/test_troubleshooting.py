@@ -80,7 +80,12 @@ def test_there_are_many_messages() -> None:
     assert len(raised()) > 200
 
 
+ANY_ARGUMENT = re.compile(r"\.\.\. must( \w+)+ \.\.\.(, got \.\.\.)?")
+"""Forms that fit any argument; of a card, which nobody typed, "give such a one" is no advice."""
+
+
 @pytest.mark.parametrize("message", raised())
 def test_a_message_has_a_form_on_the_page(message: str) -> None:
-    forms = [".*".join(re.escape(part.strip(" :,;'")) for part in form.split("...")) for form in messages()]
+    known = [form for form in messages() if "card" not in message or not ANY_ARGUMENT.fullmatch(form)]
+    forms = [".*".join(re.escape(part.strip(" :,;'")) for part in form.split("...")) for form in known]
     assert any(re.search(form, message, re.DOTALL) for form in forms), "say on the page what to do"

@@ -32,7 +32,7 @@ _MODES = (AutoresetMode.SAME_STEP, AutoresetMode.DISABLED)
 
 
 class LandingVectorEnv(VectorEnv[Seen, Array32, Any], Generic[Seen]):
-    """What the two vector environments share; each row is a `LandingEnv`, to the bit.
+    """What the native vector environments share; each row is a `LandingEnv`, to the bit.
 
     Observations, actions, rewards, ends and `info` are those of `LandingEnv`, one row for each environment.
 
@@ -98,7 +98,7 @@ class LandingVectorEnv(VectorEnv[Seen, Array32, Any], Generic[Seen]):
         self.metadata = {**self.single.metadata, "render_modes": [], "autoreset_mode": mode}
         self.study_seed: int | None = None
         self.next_episode = np.arange(self.num_envs)
-        self._ended = np.zeros(self.num_envs, np.bool_)
+        self.ended = np.zeros(self.num_envs, np.bool_)  # rows that wait for a reset
         self._seen: Parts = {}
         self.closed = False
 
@@ -148,7 +148,7 @@ class LandingVectorEnv(VectorEnv[Seen, Array32, Any], Generic[Seen]):
         return self._observation(), with_masks(describe_batch(self.batch), mask)
 
     def step(self, actions: Array32) -> tuple[Seen, Any, Mask, Mask, dict[str, Any]]:
-        """Fly one decision in every environment.
+        """Fly one decision, or of thrusts one control period, in every environment.
 
         Raises:
             ValueError: the actions are not five finite numbers for each environment.
@@ -156,8 +156,8 @@ class LandingVectorEnv(VectorEnv[Seen, Array32, Any], Generic[Seen]):
         """
         if not self._seen:
             raise gymnasium.error.ResetNeeded("no episode has begun: call reset()")
-        if self._ended.any():
-            waiting = np.flatnonzero(self._ended).tolist()
+        if self.ended.any():
+            waiting = np.flatnonzero(self.ended).tolist()
             raise gymnasium.error.ResetNeeded(
                 f"no episode is under way in environments {waiting}: call reset()"
             )
@@ -167,10 +167,10 @@ class LandingVectorEnv(VectorEnv[Seen, Array32, Any], Generic[Seen]):
         if self.max_episode_steps is not None:
             truncated |= batch.steps >= self.max_episode_steps
         self._look(everyone)
-        self._ended = terminated | truncated
+        self.ended = terminated | truncated
         info: dict[str, Any] = {}
-        if self._ended.any() and self.autoreset_mode is AutoresetMode.SAME_STEP:
-            ended = self._ended.copy()
+        if self.ended.any() and self.autoreset_mode is AutoresetMode.SAME_STEP:
+            ended = self.ended.copy()
             last = {key: blank_others(part, ended) for key, part in self._seen.items()}
             final = with_masks(describe_batch(batch), ended)
             info = {"final_obs": self.present(last), "_final_obs": ended}
@@ -207,7 +207,7 @@ class LandingVectorEnv(VectorEnv[Seen, Array32, Any], Generic[Seen]):
         for place, scenario in zip(np.flatnonzero(mask).tolist(), scenarios, strict=True):
             self.batch.begin(place, scenario)
         self.next_episode[mask] += self.num_envs
-        self._ended &= ~mask
+        self.ended &= ~mask
         self._look(mask)
 
     def _look(self, mask: Mask) -> None:

@@ -23,7 +23,7 @@ def take_snapshot(environments: LandingVectorEnv[Any]) -> dict[str, NDArray[Any]
         ValueError: no episode has begun, or one is over.
     """
     batch = environments.batch
-    if any(scenario is None for scenario in batch.scenarios) or (batch.landed | batch.timed_out).any():
+    if any(scenario is None for scenario in batch.scenarios) or environments.ended.any():
         raise ValueError("environments must have an episode under way in every row: call reset()")
     numbers = [scenario.streams.episode for scenario in batch.scenarios if scenario is not None]
     kept = {name: getattr(batch, name).copy() for name in batch.KEPT}

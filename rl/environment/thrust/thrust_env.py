@@ -123,7 +123,9 @@ class LunarHDAThrustEnv(LandingEnv[Array32]):
         else:
             self._flight = step.flight
             state = displaced(step.flight.state, self.scenario.navigation_error)
-            now = replace(look, state=state, target=step.flight.target, time_to_go=step.flight.time_to_go)
+            time = look.time + self._held * self.scenario.preset.rules.control_period
+            flown = {"target": step.flight.target, "time_to_go": step.flight.time_to_go}
+            self._now = now = replace(look, time=time, state=state, **flown)
             seen, info = self._encode_now(now, look), describe_episode(self.scenario, step.flight, self.steps)
         return seen, step.reward.total, terminated, step.truncated, info
 

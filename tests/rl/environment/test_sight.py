@@ -20,6 +20,11 @@ from rl.inference.latent import load_encoder
 from tests.equality import same
 
 
+def belief_arrays(memory: BeliefMemory) -> dict[str, np.ndarray]:
+    assert memory.belief is not None
+    return {"probability": memory.belief.probability(), "seen": memory.belief.seen}
+
+
 def belief_sight() -> BeliefSight:
     sight = make_sight("belief", CURVED, load_encoder())
     assert isinstance(sight, BeliefSight)
@@ -131,8 +136,15 @@ def test_memory_goes_in_and_comes_out():
     scenario = sample_scenario("paper", 5, 0, "train")
     look, sight = observe(scenario, begin_flight(scenario)), belief_sight()
     memory = sight.begin(scenario.view)
-    one, after = sight.see(look, memory)
-    other, _ = sight.see(look, memory)
-    assert same(one, other)
-    assert same(memory, BeliefMemory(scenario.view))
+    _, after = sight.see(look, memory)
     assert after.belief is not None
+    assert memory.belief is None
+    kept = {name: value.copy() for name, value in belief_arrays(after).items()}
+    state = replace(look.state, position=look.state.position - np.array([8.0, -5.0, 20.0]))
+    moved = replace(look, state=state, target=look.target + np.array([6.0, -4.0, 0.0]))
+    one, first = sight.see(moved, after)
+    other, second = sight.see(moved, after)
+    assert same(one, other)
+    assert same(belief_arrays(first), belief_arrays(second))
+    assert not same(belief_arrays(first), kept)  # the second look changed what is believed
+    assert same(belief_arrays(after), kept)  # but in arrays of its own

@@ -111,7 +111,7 @@ class Unmoved:
 
 
 def test_a_still_agent_burns_less_than_by_zem_zev():
-    """Over ten starts; optimal guidance to the same place cannot need more than ZEM/ZEV by much."""
+    """In each of ten starts. To the same place least propellant is what convex guidance asks for."""
     burnt = {"convex": [], "zem-zev": []}
     for guidance, values in burnt.items():
         env = LunarHDAEnv(guidance=guidance)

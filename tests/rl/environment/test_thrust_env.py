@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -11,11 +12,12 @@ import pytest
 from gymnasium.utils.env_checker import check_env as gymnasium_check
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from matplotlib.axes import Axes
 from stable_baselines3.common.env_checker import check_env as sb3_check
 
 import rl  # noqa: F401 - registers the environments
 from guidance.zem_zev import zem_zev_acceleration
-from hda.flight.episode import fly
+from hda.flight.episode import begin_flight, fly, observe
 from hda.registry import make_policy
 from hda.task.presets import PRESETS
 from hda.task.scenario import sample_scenario
@@ -24,6 +26,7 @@ from rl.environment.native.vector_snapshot import restore_snapshot, take_snapsho
 from rl.environment.thrust.thrust_action import REACH, thrust_acceleration
 from rl.environment.thrust.thrust_env import LunarHDAThrustEnv
 from rl.environment.thrust.thrust_vector_env import LunarHDAThrustVectorEnv
+from rl.inference.artefacts import Artefact
 from rl.inference.networks import Perceptron
 from rl.policies.actor import actor_from_artefact
 from rl.policies.thrust_actor import ThrustActor
@@ -152,14 +155,26 @@ def small_actor(scale: float) -> tuple[ThrustActor, Perceptron]:
         "layer.1.weight": rng.normal(0.0, scale, (8, 5)).astype(np.float32),
         "layer.1.bias": np.array([0.0, 0.0, 0.05, 0.3, -0.2], np.float32),
     }
-    from pathlib import Path
-
-    from rl.inference.artefacts import Artefact
-
     recipe = replace(RECIPES["ppo-thrust"], hidden=(8,))
     actor = actor_from_artefact(Artefact("actor", tensors, actor_card(recipe)), Path("small"))
     assert isinstance(actor, ThrustActor)
     return actor, actor.network
+
+
+def test_the_foretold_period_after_the_next_look_repeats_the_action_before_it():
+    """The actor pushes harder as its look grows old; a look that it has not seen does not make it young."""
+    actor, network = small_actor(0.0)
+    weights = [np.zeros_like(weight) for weight, _ in network.layers]
+    weights[0][44, 0], weights[1][0, 2] = 1.0, 0.1  # of the age; of the push upwards
+    layers = tuple((weight, bias) for weight, (_, bias) in zip(weights, network.layers, strict=True))
+    actor = replace(actor, network=Perceptron(layers))
+    scenario = sample_scenario(STILL, 3, 0, "train")
+    look = observe(scenario, begin_flight(scenario))
+    states, _ = actor.foretell(look, scenario.view, look.time_to_go)
+    assert len(states) == scenario.view.control_periods + 2
+    climbs = np.diff(states[:, 5])
+    assert np.all(np.diff(climbs[:-1]) > 0.01)
+    assert climbs[-1] == pytest.approx(climbs[-2], abs=1e-3)
 
 
 class Flown:
@@ -198,6 +213,35 @@ def test_with_an_engine_that_does_not_err_the_policy_flies_what_the_agent_does(s
     assert env.outcome is not None
     np.testing.assert_allclose(env.outcome.touchdown, record.outcome.touchdown, atol=0.1)
     assert env.outcome.ending is record.outcome.ending
+
+
+def test_a_picture_between_looks_shows_this_instant(monkeypatch):
+    titles, crosses = [], []
+
+    def set_title(axes: Axes, text: str) -> None:
+        titles.append(text)
+
+    def plot(axes: Axes, *arguments: Any, **options: Any) -> None:
+        if str(arguments[-1]) == "+":
+            crosses.append(arguments[:2])
+
+    monkeypatch.setattr(Axes, "set_title", set_title)
+    monkeypatch.setattr(Axes, "plot", plot)
+    env = LunarHDAThrustEnv(render_mode="rgb_array")
+    scenario = sample_scenario("paper", 3, 0, "train")
+    env.reset(options={"scenario": scenario})
+    for k in range(12):
+        titles.clear()
+        crosses.clear()
+        env.render()
+        flight = env.steps[-1].flight if env.steps else None
+        state = flight.state if flight else scenario.initial_state
+        target = flight.target if flight else scenario.nominal_target
+        height = state.position[2] - target[2]
+        assert titles[0] == f"true safety; t = {0.5 * k:g} s, {height:.0f} m above the target"
+        np.testing.assert_allclose(crosses[0], target[:2])
+        assert (np.array(crosses[1]) == 0.0).all() == (k % 10 == 0)  # the look lies where it was taken
+        env.step(np.array([0.0, 0.0, 0.1, 0.5, -0.25], np.float32))
 
 
 def test_checkers_are_content_and_vectors_are_native():

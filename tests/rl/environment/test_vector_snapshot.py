@@ -35,6 +35,23 @@ def test_restored_flights_equal_those_that_were_never_kept(kind, preset, study, 
     assert ends >= count
 
 
+def test_an_episode_that_a_limit_of_steps_cut_is_not_kept():
+    """It is in flight yet, and waits for a reset."""
+    environments = LunarHDAVectorEnv(2, autoreset_mode="Disabled", max_episode_steps=1)
+    environments.reset(seed=0)
+    take_snapshot(environments)
+    _, _, terminated, truncated, _ = environments.step(np.zeros((2, 5), np.float32))
+    assert truncated.all()
+    assert not terminated.any()
+    with pytest.raises(ValueError, match="under way in every row"):
+        take_snapshot(environments)
+    environments.reset(options={"reset_mask": np.array([True, False])})
+    with pytest.raises(ValueError, match="under way in every row"):
+        take_snapshot(environments)
+    environments.reset()
+    take_snapshot(environments)
+
+
 def test_what_is_not_under_way_is_not_kept():
     environments = LunarHDAVectorEnv(2, autoreset_mode="Disabled")
     with pytest.raises(ValueError, match="under way in every row"):

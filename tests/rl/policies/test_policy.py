@@ -130,6 +130,11 @@ def test_fixed_gain_takes_the_agents_sites_and_nothing_else(weights):
         ({"action_ranges": {"gain": 3}}, "action_ranges"),
         ({"sight": "ears"}, "unknown sight"),
         ({"guidance": "hope"}, "unknown guidance"),
+        ({"guidance": ["convex"]}, "unknown guidance"),
+        ({"algorithm": "a2c"}, "unknown algorithm 'a2c'"),
+        ({"algorithm": None}, "unknown algorithm None"),
+        ({"guidance": "thrust", "sight": "belief"}, "guidance thrust goes with sight look"),
+        ({"guidance": "thrust", "algorithm": "recurrent-ppo"}, "an agent without memory"),
     ],
 )
 def test_weights_of_another_version_are_refused_when_the_policy_begins(weights, change, message):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,7 @@ from rl.learning.algorithms import make_algorithm
 from rl.policies.actor import AgentPolicy
 from rl.policies.recurrent_actor import RecurrentAgentPolicy, memory_actor_from_artefact
 from rl.settings import ON_POLICY_RECIPES, RECIPES, OnPolicySettings, settings_from_json
+from rl.train import _AGENTS
 from rl.training.actor_export import actor_card, actor_tensors
 from rl.training.candidates import Choice
 from rl.training.export import ExportWeights, run_export
@@ -136,7 +138,7 @@ def test_runs_are_exported(name, tmp_path):
 def test_weights_of_another_algorithm_are_refused(tmp_path):
     algorithm, settings = trained("recurrent-ppo")
     card = {**actor_card(settings), "algorithm": "ppo"}
-    with pytest.raises(ArtefactError, match="algorithm must be one of td3-lstm, "):
+    with pytest.raises(ArtefactError, match=r"algorithm' must be one with memory \(td3-lstm, "):
         memory_actor_from_artefact(Artefact("actor", actor_tensors(algorithm), card), tmp_path)
     card["algorithm"] = "td3-lstm"  # whose LSTM also sees the last action
     with pytest.raises(ArtefactError, match=r"lstm\.input"):
@@ -160,6 +162,35 @@ def test_thrust_goes_with_looks_and_without_memory(tmp_path):
     assert not any(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize("changes", [{"sight": "belief"}, {"guidance": "convex"}])
+@pytest.mark.parametrize("name", ["ppo", "recurrent-ppo"])
+def test_proximal_policies_refuse_what_no_batch_serves_and_name_the_recipes_that_learn_it(
+    name, changes, tmp_path
+):
+    with pytest.raises(ValueError, match=f"{name} does not learn with sight .*: take td3-belief, td3-convex"):
+        run_training(tmp_path, PAPER, replace(SMALL[name], **changes), plan(name, 48), resume=False)
+    assert not any(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_no_run_goes_on_where_the_learning_rate_is_zero(name, tmp_path):
+    settings, (_, end) = SMALL[name], SMALL[name].learning_rate_decay
+    assert settings.learning_rate_at(end + 1) == 0.0 < settings.learning_rate_at(end - 1)
+    settings.refuse_steps(end)
+    message = f"steps must be at most {end}, .* --learning-rate-decay 0 {end + 1}"
+    with pytest.raises(ValueError, match=message):
+        run_training(tmp_path, PAPER, settings, plan(name, end + 1), resume=False)
+    assert not any(tmp_path.iterdir())
+    replace(settings, learning_rate_decay=(0, end + 1)).refuse_steps(end + 1)
+    RECIPES["td3"].refuse_steps(10**9)  # its rate never comes to 0
+
+
+def test_every_recipe_learns_for_all_steps_of_its_command():
+    for command in _AGENTS:
+        options = command.__metadata__[0].default
+        options.settings.refuse_steps(options.steps)
+
+
 def test_measured_looks_have_no_batch(tmp_path):
     with pytest.raises(ValueError, match="preset must have looks by Algorithm 2"):
         run_training(tmp_path, PRESETS["lidar"], SMALL["ppo"], plan("ppo", 48), resume=False)
@@ -167,7 +198,5 @@ def test_measured_looks_have_no_batch(tmp_path):
 
 @pytest.mark.parametrize("name", sorted(RECIPES))
 def test_settings_survive_their_card(name):
-    import json
-
     recipe = RECIPES[name]
     assert settings_from_json(json.loads(json.dumps(asdict(recipe)))) == recipe

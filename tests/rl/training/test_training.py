@@ -11,6 +11,7 @@ import pytest
 from hda.task.presets import PRESETS
 from rl.inference.artefacts import ArtefactError, load_artefact
 from rl.settings import RECIPES
+from rl.training.export import ExportWeights, run_export
 from rl.training.run import run_training
 from rl.training.run_folder import TrainingPlan, read_rows
 
@@ -104,6 +105,19 @@ def test_a_run_from_before_a_setting_was_added_goes_on(tmp_path):
     (folder / "run.json").write_text(json.dumps(card))
     run_training(folder, PAPER, SMALL["td3"], plan(80), resume=True)
     assert read_rows(folder / "training.csv")[-1]["step"] == "80"
+
+
+def test_a_run_with_a_setting_of_another_version_is_refused(tmp_path):
+    folder = tmp_path / "run"
+    run_training(folder, PAPER, SMALL["td3"], plan(60), resume=False)
+    card = json.loads((folder / "run.json").read_text())
+    card["settings"] |= {"temperature": 1.0, "momentum": 0.9}
+    (folder / "run.json").write_text(json.dumps(card))
+    message = "settings of another version: momentum, temperature"
+    with pytest.raises(ValueError, match=message):
+        run_training(folder, PAPER, SMALL["td3"], plan(80), resume=True)
+    with pytest.raises(ValueError, match=message):
+        run_export(ExportWeights((folder,), "agent", out=tmp_path))
 
 
 def test_a_damaged_checkpoint_is_refused(tmp_path):
