@@ -79,7 +79,8 @@ RESULTS: dict[str, Result] = {
     "faults": Result("robustness.md", "studies.faults"),
     "measured": Result(
         "realism.md",
-        "studies.realism --presets paper lidar lidar-coarse --episodes 500 --explained 8 --out results/measured",
+        "studies.realism --presets paper lidar lidar-coarse --episodes 500 --explained 8"
+        " --out results/measured",
     ),
     "realism": Result("realism.md", "studies.realism --explained 6"),
     "rare-events": Result("rare-events.md", "studies.rare_events --effort 0.08 --whole 6000"),
