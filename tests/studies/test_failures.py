@@ -82,12 +82,15 @@ def test_on_a_body_that_measures_ranges_the_map_alone_tells_what_was_read() -> N
     lidar = replace(PRESETS["rigid-body"].lidar, off_nadir_limit=math.radians(5.7))
     preset = replace(PRESETS["rigid-body"], name="fixed-sensor", lidar=lidar)
     record = fly(make_policy("nearest-safe"), sample_scenario(preset, 1, 0))
+    shown = 0
     for observation in record.observations:
         rows, _, read = read_pixels(record.scenario, observation)
         assert observation.ground is not None
         known = observation.ground.known_map(observation.target, observation.width, rows.size)
         assert not (read & ~known).any()
-        assert read.sum() > 0.9 * known.sum()  # all but those beyond the tile's edge
+        assert read.sum() >= 0.9 * known.sum()  # all but those beyond the tile's edge
+        shown += int(known.sum())
+    assert shown > 0  # a look may show nothing
 
 
 def test_a_landing_that_leans_alone_is_told_so() -> None:
