@@ -39,6 +39,7 @@ def hold_thrusts(first: int, last: int, flights: Flights, vehicle: Vehicle) -> N
             limits,
             error,
             flights.navigation_error[k],
+            None,  # compiled code takes no defaults
             None,
         )
         for axis in range(3):
