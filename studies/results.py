@@ -71,6 +71,12 @@ RESULTS: dict[str, Result] = {
     "robustness": Result(
         "robustness.md", "studies.robustness --levels 1 --episodes 1000 --policies nearest-safe hazard-aware"
     ),
+    "robustness-lidar": Result(
+        "robustness.md",
+        "studies.robustness --preset lidar --factors rays range-noise range-bias ray-dropout pointing-error"
+        " scan-time --levels 2 --policies nearest-safe nearest-safe+convex hazard-aware"
+        " --out results/robustness_lidar",
+    ),
     "robustness-navigated": Result(
         "robustness.md",
         "studies.robustness --preset navigated --factors navigation --levels 2 --policies single-divert"
