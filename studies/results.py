@@ -82,7 +82,7 @@ RESULTS: dict[str, Result] = {
         "studies.robustness --preset navigated --factors navigation --levels 2 --policies single-divert"
         " nearest-safe nearest-safe+convex hazard-aware deferred-decision --out results/robustness_navigated",
     ),
-    "faults": Result("robustness.md", "studies.faults"),
+    "faults": Result("robustness.md", "studies.faults --episodes 100 --explained 4"),
     "measured": Result(
         "realism.md",
         "studies.realism --presets paper lidar lidar-coarse --episodes 500 --explained 8"
