@@ -23,10 +23,10 @@ from hda.navigation.system import NAVIGATION_FAULTS, add_fault
 from hda.task.body_variants import BODY_VARIANTS, vary_body
 from hda.task.presets import Preset, find_preset
 from studies.campaign.command_line import choose_policies, open_folder, resumable
-from studies.campaign.journal import Journal, open_journal
+from studies.campaign.journal import Journal
 from studies.campaign.monte_carlo import Study
 from studies.campaign.points import Point, Rows, fly_points
-from studies.campaign.provenance import describe_run, identify_run, write_provenance
+from studies.campaign.provenance import describe_run, write_provenance
 from studies.campaign.run_options import FlyingOptions
 from studies.campaign.score import (
     DROP_COLUMN,
@@ -38,12 +38,11 @@ from studies.campaign.score import (
 )
 from studies.columns import Column, Output, console_table, write_csv, write_markdown
 from studies.failures.causes import Failure
-from studies.failures.explained import explain_episodes
+from studies.failures.explained import explain_episodes, open_causes, print_causes
 from studies.statistics.ratios import Interval
 
 NO_FAULT = "no-fault"
 """The preset as it is."""
-_CAUSES = "causes"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -165,8 +164,7 @@ def run_faults(options: Faults) -> list[FaultRow]:
     flown = fly_points(out, points, options.existing, options.workers)
     study = points[0].study
     decided = {"preset": study.preset.name, "study_seed": study.study_seed, "split": study.split}
-    identity = identify_run(Path(__file__).with_name("failures"), decided, study.paths)
-    with open_journal(out / _CAUSES, Failure, (), identity, options.existing) as journal:
+    with open_causes(out, decided, study.paths, options.existing) as journal:
         lines = tabulate(points, flown, options.explained, journal)
     write_csv(out / "table.csv", COLUMNS, lines)
     write_markdown(out / "table.md", COLUMNS, lines)
@@ -174,10 +172,7 @@ def run_faults(options: Faults) -> list[FaultRow]:
     title = f"faults of navigation on {study.preset.name}, {options.episodes} episodes"
     console = Console(width=max(Console().width, 120))
     console.print(console_table(COLUMNS, lines, title))
-    for line in lines:
-        if line.causes:
-            told = f"{line.fault}, {line.policy}: {line.causes}"
-            console.print(told, highlight=False, markup=False, soft_wrap=True)
+    print_causes(console, ((line.fault, line.policy, line.causes) for line in lines))
     return lines
 
 

@@ -22,14 +22,14 @@ from guidance.console import tolerate_encoding
 from guidance.validation import finite_number
 from hda.task.presets import Preset, find_preset
 from studies.campaign.command_line import choose_policies, open_folder, resumable
-from studies.campaign.journal import Journal, open_journal
+from studies.campaign.journal import Journal
 from studies.campaign.monte_carlo import Study
 from studies.campaign.points import Point, Rows, fly_points
-from studies.campaign.provenance import describe_run, identify_run, write_provenance
+from studies.campaign.provenance import describe_run, write_provenance
 from studies.campaign.run_options import RunOptions
 from studies.columns import console_table, write_csv, write_markdown
 from studies.failures.causes import Failure
-from studies.failures.explained import explain_episodes
+from studies.failures.explained import explain_episodes, open_causes, print_causes
 from studies.realism.layers import (
     LAYER_COLUMNS,
     LayerRow,
@@ -39,8 +39,6 @@ from studies.realism.layers import (
     describe_layer,
     pair_columns,
 )
-
-_CAUSES = "causes"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -136,8 +134,7 @@ def run_realism(options: Realism) -> list[LayerRow]:
     flown = fly_points(out, points, options.existing, options.workers)
     study = points[0].study
     decided = {"study_seed": study.study_seed, "split": study.split}
-    identity = identify_run(Path(__file__).parent, decided, study.paths)
-    with open_journal(out / _CAUSES, Failure, (), identity, options.existing) as journal:
+    with open_causes(out, decided, study.paths, options.existing) as journal:
         lines = tabulate(points, flown, options.explained, journal)
     write_csv(out / "table.csv", LAYER_COLUMNS, lines)
     write_markdown(out / "table.md", LAYER_COLUMNS, lines)
@@ -165,10 +162,7 @@ def print_layers(lines: Sequence[LayerRow], pairs: Sequence[PairRow], options: R
     console = Console(width=max(Console().width, 120))
     title = f"{', '.join(options.presets)}: {options.episodes} episodes each"
     console.print(console_table(LAYER_COLUMNS, lines, title))
-    for line in lines:
-        if line.causes:
-            told = f"{line.preset}, {line.policy}: {line.causes}"
-            console.print(told, highlight=False, markup=False, soft_wrap=True)
+    print_causes(console, ((line.preset, line.policy, line.causes) for line in lines))
     counts = {verdict: sum(pair.verdict is verdict for pair in pairs) for verdict in Verdict}
     words = ", ".join(f"{count} {verdict.value}" for verdict, count in counts.items() if count)
     console.print(f"order of {len(pairs)} pairs: {words or 'no pair'}", highlight=False, markup=False)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from itertools import combinations
 
@@ -213,15 +213,7 @@ LAYER_COLUMNS: tuple[Column[LayerRow], ...] = (
         mark=lambda row: " *" if policy_entry(row.policy).privileged else "",
     ),
     *(column.through(lambda row: row.score) for column in (*RATIO_COLUMNS, PROPELLANT_COLUMN)),
-    Column(
-        "step_points",
-        "step",
-        lambda row: scaled(row.step, 100.0),
-        digits=1,
-        unit="points",
-        interval=True,
-        stem="step",
-    ),
+    replace(DROP_COLUMN.through(lambda row: row.step), key="step_points", heading="step", stem="step"),
     DROP_COLUMN.through(lambda row: row.fall),
     Column(
         "price_points",

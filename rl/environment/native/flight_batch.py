@@ -175,6 +175,13 @@ class FlightBatch:
         gains = scaled.position_gain, scaled.velocity_gain
         command = np.stack([*gains, self.time_to_go, scaled.time_to_go_rate], axis=1)
         mass, self.target = self.state[:, 6].copy(), self.target + shift
+        self._fly(fly_decisions, command)
+        self.time_to_go = command[:, 2].copy()
+        self.index += 1
+        return self._pay(mass)
+
+    def _fly(self, kernel: Callable[[int, int, Flights, Vehicle], None], command: Array) -> None:
+        """Fly every episode by a kernel, which reads a row of `command` for each; `landed` is set."""
         self._thrust_seed[:, -1] = self.index
         flights = Flights(
             self.state,
@@ -186,11 +193,12 @@ class FlightBatch:
             self._status,
             self.pointing_limited,
         )
-        self.spread(lambda first, last: fly_decisions(first, last, flights, self._vehicle), len(mass))
-        self.time_to_go = command[:, 2].copy()
-        self.index += 1
-        preset = self.settings.preset
+        self.spread(lambda first, last: kernel(first, last, flights, self._vehicle), len(command))
         self.landed = self._status != FlightStatus.FLYING
+
+    def _pay(self, mass: Array) -> Array:
+        """Rewards, shape (n,), of flights that began with a mass [kg], shape (n,); `timed_out` is set."""
+        preset = self.settings.preset
         self.timed_out = ~self.landed & (self.index >= preset.rules.max_decisions)
         self._score((mass - self.state[:, 6]) / (self.start_mass - preset.lander.dry_mass))
         return reduce(np.add, self.reward_terms.T)

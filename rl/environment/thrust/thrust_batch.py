@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import reduce
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +11,6 @@ from guidance.arrays import Array, Index
 from guidance.kernel import compile_kernel
 from guidance.thrust_limits import limit_into
 from hda.flight.held_thrust import FlightConditions, VehicleLimits, hold_period
-from hda.flight.vehicle import FlightStatus
 from hda.task.look_noise import draw_symmetric
 from hda.task.scenario import Scenario
 from rl.environment.action import clip_actions
@@ -92,24 +90,10 @@ class ThrustBatch(FlightBatch):
         self.target = self.target + np.where(self.held[:, None] == 0, shift, 0.0)
         asked = thrust_acceleration(values, self._vehicle.gravity)
         mass = self.state[:, 6].copy()
-        self._thrust_seed[:, -1] = self.index
-        flights = Flights(
-            self.state,
-            self.target,
-            asked,
-            self.navigation_error,
-            self._thrust_seed,
-            self._thrust_bound,
-            self._status,
-            self.pointing_limited,
-        )
-        self.spread(lambda first, last: hold_thrusts(first, last, flights, self._vehicle), len(mass))
+        self._fly(hold_thrusts, asked)
         self.time_to_go = self.time_to_go - rules.control_period
-        self.landed = self._status != FlightStatus.FLYING
         self.held = np.where(self.landed, rules.control_periods, self.held + 1)
         whole = self.held == rules.control_periods
         self.index += whole
         self.held[whole] = 0
-        self.timed_out = ~self.landed & (self.index >= rules.max_decisions)
-        self._score((mass - self.state[:, 6]) / (self.start_mass - self.settings.preset.lander.dry_mass))
-        return reduce(np.add, self.reward_terms.T)
+        return self._pay(mass)
