@@ -162,24 +162,24 @@ class OnPolicySettings(AgentSettings):
         value_weight: of the critic's loss.
         greatest_gradient: norm at which gradients are cut.
         log_deviation: of the actions at the start. Their range is [-1, 1]: with 0 about a third of
-            the draws lie beyond it, with -1.5 hardly any.
+            the draws lie beyond it, with -1 one in 150.
     """
 
     algorithm: AlgorithmName = "ppo"
     learning_rate: float = 1e-3
     final_learning_rate: float = 0.0
-    learning_rate_decay: tuple[int, int] = (0, 600_000)
+    learning_rate_decay: tuple[int, int] = (0, 2_000_000)
     matmul_precision: Literal["highest", "high", "medium"] = "highest"
-    environments: int = 64
+    environments: int = 256
     horizon: int = 32
     epochs: int = 10
-    batch_size: int = 512
+    batch_size: int = 1024
     discount: float = 0.99
     trace: float = 0.95
     clip: float = 0.2
     value_weight: float = 0.5
     greatest_gradient: float = 0.5
-    log_deviation: float = -1.5
+    log_deviation: float = -1.0
 
 
 @dataclass(frozen=True)
@@ -193,18 +193,13 @@ class RecurrentOnPolicySettings(OnPolicySettings):
 
     algorithm: AlgorithmName = "recurrent-ppo"
     hidden: tuple[int, ...] = (256,)
+    learning_rate_decay: tuple[int, int] = (0, 600_000)
     memory: int = 128
 
 
 PPO_SETTINGS = OnPolicySettings()
-
-
 RECURRENT_PPO_SETTINGS = RecurrentOnPolicySettings()
-
-
 TD3_SETTINGS = OffPolicyAgentSettings()
-
-
 SAC_SETTINGS = replace(
     TD3_SETTINGS,
     algorithm="sac",
@@ -262,10 +257,11 @@ ON_POLICY_RECIPES: dict[str, OnPolicySettings] = {
         guidance="thrust",
         learning_rate=5e-4,
         learning_rate_decay=(0, 4_000_000),
+        environments=64,
         horizon=128,
-        batch_size=1024,
         discount=0.998,
         trace=0.98,
+        log_deviation=-1.5,
     ),
 }
 

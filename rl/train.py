@@ -99,7 +99,7 @@ class TrainOnPolicyAgent(TrainingOptions):
     """
 
     settings: tyro.conf.OmitArgPrefixes[OnPolicySettings] = ON_POLICY_RECIPES["ppo"]
-    steps: int = 600_000
+    steps: int = 2_000_000
 
 
 @dataclass(frozen=True)
