@@ -31,7 +31,7 @@ from studies.campaign.provenance import describe_run, identify_run, write_proven
 from studies.campaign.run_options import FolderOptions
 from studies.columns import console_table, write_csv, write_markdown
 from studies.information_bound.restrictions import FloorRow, bound_episode, list_restrictions
-from studies.information_bound.table import COLUMNS, StepRow, list_steps, tell_recognition
+from studies.information_bound.table import COLUMNS, StepRow, list_steps, tell_recognition, tell_sight
 from studies.information_bound.told import told_name, told_path
 
 _FIRST, _LAST = "oracle-fuel", "hazard-aware"
@@ -122,7 +122,11 @@ def run_information_bound(options: InformationBound) -> list[StepRow]:
     console = Console(width=max(Console().width, 130))
     title = f"{study.preset.name}, {study.split}: {study.episodes} episodes"
     console.print(console_table(COLUMNS, lines, title, "* sees the true map, or is told it"))
-    for words in (tell_gap(lines), tell_recognition(floors)):
+    for words in (
+        tell_gap(lines),
+        tell_recognition(floors),
+        tell_sight(floors, flown[_FIRST], flown[_LAST]),
+    ):
         console.print(words, highlight=False, markup=False)
     return lines
 

@@ -10,12 +10,13 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from guidance.arrays import Array
 from hda.policies.planned_descent import PlannedDescent
 from hda.policies.privileged.oracle import safe_clearance
 from hda.task.presets import Preset
-from hda.task.scenario import Scenario, sample_scenario, view_of_preset
+from hda.task.scenario import Scenario, ground_point, sample_scenario, view_of_preset
 from studies.campaign.monte_carlo import Study
 from studies.information_bound.cheapest_landing import Arrival, bound_cheapest
 from studies.information_bound.recognition import (
@@ -30,6 +31,7 @@ from studies.information_bound.recognition import (
 FAILURE = 100.0
 """[%] that a failure costs: a whole tank."""
 _CLEARANCE = 2.0  # [m] of `oracle-fuel`
+_ROUNDING = 0.01  # [%] between two bounds of the same ground
 _NEARLY = 1.0  # [%] above the cheapest: places that the penalty is applied to one by one
 
 
@@ -42,6 +44,7 @@ class Restriction:
         thrust: greatest share of the greatest thrust that the engine gives.
         arrival: how a landing may end, before the terminal phase.
         clearance: [m] of safe ground around the site.
+        in_view: the first look showed the site.
         gate: [m] height at which the terminal phase begins; 0 without one.
         terminal: [m/s] that the terminal phase spends.
     """
@@ -50,6 +53,7 @@ class Restriction:
     thrust: float
     arrival: Arrival
     clearance: float = 0.0
+    in_view: bool = False
     gate: float = 0.0
     terminal: float = 0.0
 
@@ -77,18 +81,20 @@ def list_restrictions(preset: Preset) -> tuple[Restriction, ...]:
         gate=0.5 * sinking * seconds,
         terminal=(gravity + options.terminal_deceleration) * seconds,
     )
+    clear = replace(
+        gently,
+        name="2 m of safe ground about",
+        clearance=_CLEARANCE,
+        arrival=replace(gently.arrival, half_cell=0.0),
+    )
     return (
         Restriction("every policy", strong, moving),
         Restriction("touchdown at rest", strong, anywhere),
         Restriction("the engine as specified", 1.0, anywhere),
         Restriction("a margin of thrust", weak, anywhere),
         gently,
-        replace(
-            gently,
-            name="2 m of safe ground about",
-            clearance=_CLEARANCE,
-            arrival=replace(gently.arrival, half_cell=0.0),
-        ),
+        clear,
+        replace(clear, name="ground that the first look shows", in_view=True),
     )
 
 
@@ -99,6 +105,7 @@ class FloorRow:
     Attributes:
         tile: number of its ground.
         floors: [%] of the propellant, for each restriction; a whole tank where nothing safe is reached.
+        in_view: the first look shows the cheapest ground of those that fly as `oracle-fuel` does.
         penalised: [%] the first one for policies that settle their cell by the first look, penalised by what
             knowing the tile is worth; nan where the posterior of the tiles is not computed.
         log_odds: of the true tile after the first look, natural logarithm; nan as before.
@@ -106,6 +113,7 @@ class FloorRow:
 
     tile: int
     floors: tuple[float, ...]
+    in_view: bool
     penalised: float
     log_odds: float
 
@@ -119,24 +127,39 @@ def bound_episode(study: Study, episode: int) -> FloorRow:
     penalised, odds = math.nan, math.nan
     if can_recognise(scenario):
         penalised, odds = penalise(scenario, *found[0])
-    return FloorRow(scenario.tile.number, floors, penalised, odds)
+    in_view = floors[-1] <= floors[-2] + _ROUNDING
+    return FloorRow(scenario.tile.number, floors, in_view, penalised, odds)
 
 
-def safe_places(scenario: Scenario, clearance: float) -> Array:
-    """[m] shape (n, 2): middles of truly safe cells with so much safe ground around, or with the most."""
+def safe_places(scenario: Scenario, restriction: Restriction) -> Array:
+    """[m] shape (n, 2): middles of the truly safe cells that a class may land on.
+
+    Where no cell has as much safe ground around as it asks for, those with the most count.
+    """
     room = safe_clearance(scenario.tile)
-    wanted = min(clearance, float(room.max()))
+    wanted = min(restriction.clearance, float(room.max()))
     row, column = np.nonzero(scenario.tile.deterministic & (room >= wanted))
-    return np.column_stack([column, row]).astype(np.float64) + 0.5
+    places = np.column_stack([column, row]).astype(np.float64) + 0.5
+    return places[_shown(scenario, places)] if restriction.in_view else places
+
+
+def _shown(scenario: Scenario, places: Array) -> NDArray[np.bool_]:
+    """Shape (n,): which places lie in the square of the first look, and near enough to its vertical."""
+    lidar, position = scenario.preset.lidar, scenario.initial_state.position
+    target = ground_point(scenario, scenario.nominal_target)
+    half = 0.5 * lidar.width(position, target)
+    reach = math.tan(lidar.off_nadir_limit) * float(position[2] - target[2])
+    inside = np.abs(places - target[:2]).max(axis=1) <= half
+    return inside & (np.hypot(*(places - position[:2]).T) <= reach)
 
 
 def bound_losses(scenario: Scenario, restriction: Restriction) -> tuple[Array, Array]:
-    """Safe places [m], shape (n, 2), and the loss [%] that no flight of the class to each undercuts."""
-    places = safe_places(scenario, restriction.clearance)
+    """Places that a class may land on [m], shape (n, 2), and the loss [%] that no flight to each undercuts."""
+    places = safe_places(scenario, restriction)
     preset, state = scenario.preset, scenario.initial_state
-    lander = replace(preset.lander, max_thrust=preset.lander.max_thrust * restriction.thrust)
     if len(places) == 0:
         return places, np.empty(0)
+    lander = replace(preset.lander, max_thrust=preset.lander.max_thrust * restriction.thrust)
     height = float(scenario.nominal_target[2]) + restriction.gate
     spent = bound_cheapest(state, places, lander, np.array(preset.gravity), height, restriction.arrival)
     burnt = state.mass * -np.expm1(-(spent + restriction.terminal) / lander.exhaust_velocity)

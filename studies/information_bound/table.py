@@ -113,3 +113,14 @@ def tell_recognition(floors: Sequence[FloorRow]) -> str:
         f"the first look tells the tile in {told} of {odds.size} episodes, by odds of 1e{least:.0f} or more;"
         f" penalised by that, the first bound rises by at most {most:.2g} points in any"
     )
+
+
+def tell_sight(floors: Sequence[FloorRow], best: Sequence[EpisodeRow], last: Sequence[EpisodeRow]) -> str:
+    """What the square of the first look costs, in words: by how much `last` loses more than `best`."""
+    more, seen = flown_losses(last) - flown_losses(best), np.array([row.in_view for row in floors])
+    parts = [
+        f"by {more[group].mean():.2f} points {where}, in {group.sum()} of {seen.size} episodes"
+        for group, where in ((seen, "where the first look shows the cheapest ground"), (~seen, "elsewhere"))
+        if group.any()
+    ]
+    return f"{last[0].policy} loses more than {best[0].policy} " + ", and ".join(parts)

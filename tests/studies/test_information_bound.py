@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import guidance
-from hda.flight.episode import fly
+from hda.flight.episode import begin_flight, fly, observe
 from hda.policies.beliefs.belief import SafetyBelief
 from hda.policies.privileged.oracle import safe_clearance
 from hda.registry import make_policy
@@ -96,15 +96,17 @@ def test_every_flight_lies_above_the_bounds_that_hold_for_it() -> None:
 def test_the_class_of_a_bound_says_which_cells_it_lands_on() -> None:
     scenario = sample_scenario("paper", 0, 1)
     tile = scenario.tile
-    for clearance in (0.0, 2.0):
-        places = safe_places(scenario, clearance)
+    first, *_, clear, shown = list_restrictions(scenario.preset)
+    for each in (first, clear):
+        places = safe_places(scenario, each)
         row, column = (np.floor(places[:, axis]).astype(int) for axis in (1, 0))
-        assert len(places) == (tile.deterministic & (safe_clearance(tile) >= clearance)).sum()
-        assert (safe_clearance(tile)[row, column] >= clearance).all()
-    fewest = list_restrictions(scenario.preset)[-1]
-    places, losses = bound_losses(scenario, fewest)
-    assert losses.shape == (len(places),)
-    assert losses.min() > 0.0
+        assert len(places) == (tile.deterministic & (safe_clearance(tile) >= each.clearance)).sum()
+        assert (safe_clearance(tile)[row, column] >= each.clearance).all()
+    places, losses = bound_losses(scenario, shown)
+    assert 0 < len(places) == len(losses) < len(safe_places(scenario, clear))
+    look = observe(scenario, begin_flight(scenario))
+    assert np.abs(places - look.target[:2]).max() <= 0.5 * look.width
+    assert losses.min() >= bound_losses(scenario, clear)[1].min() - 0.01
 
 
 def test_a_setting_on_real_ground_is_refused() -> None:
@@ -165,8 +167,6 @@ def test_the_likelihood_of_a_look_is_that_of_its_pixels_one_by_one() -> None:
     preset = find_preset("paper")
     preset = replace(preset, lidar=replace(preset.lidar, pixels=6, noise=0.4))
     scenario = sample_scenario(preset, 0, 3)
-    from hda.flight.episode import begin_flight, observe
-
     seen = observe(scenario, begin_flight(scenario))
     position, target, width = seen.state.position, seen.target, seen.width
     for tile in candidate_tiles(scenario)[:3]:
@@ -225,7 +225,7 @@ def test_a_path_that_says_no_look_leads_to_no_policy() -> None:
 def test_the_command_writes_the_steps_and_goes_on(tmp_path: Path) -> None:
     options = replace(SMALL, out=tmp_path / "bounded")
     lines = run(options)
-    assert [line.proved for line in lines] == [True] * 6 + [False] * 4
+    assert [line.proved for line in lines] == [True] * 7 + [False] * 4
     assert lines[-1].step == "hazard-aware"
     assert lines[-1].below.estimate == 0.0
     assert lines[0].below.estimate == pytest.approx(sum(line.rise.estimate for line in lines[1:]))
