@@ -154,7 +154,7 @@ def _shown(scenario: Scenario, places: Array) -> NDArray[np.bool_]:
 
 
 def bound_losses(scenario: Scenario, restriction: Restriction) -> tuple[Array, Array]:
-    """Places that a class may land on [m], shape (n, 2), and the loss [%] that no flight to each undercuts."""
+    """Places that a class may land on [m], shape (n, 2), and the loss [%] that none to each undercuts."""
     places = safe_places(scenario, restriction)
     preset, state = scenario.preset, scenario.initial_state
     if len(places) == 0:

@@ -116,7 +116,7 @@ def test_a_setting_on_real_ground_is_refused() -> None:
 
 def joint_chances(tiles: np.ndarray, right: float) -> tuple[list[tuple[int, ...]], np.ndarray]:
     """All readings of the cells, and the chance of each with each of equally likely tiles, shape (m, k)."""
-    readings = list(product((0, 1), repeat=tiles.shape[1]))
+    readings = list(product(range(2), repeat=tiles.shape[1]))
     agree = tiles[:, None, :] == np.array(readings)[None]
     return readings, np.where(agree, right, 1.0 - right).prod(axis=2) / len(tiles)
 
