@@ -10,7 +10,6 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from guidance.arrays import Array
 from hda.policies.planned_descent import PlannedDescent
@@ -31,7 +30,6 @@ from studies.information_bound.recognition import (
 FAILURE = 100.0
 """[%] that a failure costs: a whole tank."""
 _CLEARANCE = 2.0  # [m] of `oracle-fuel`
-_ROUNDING = 0.01  # [%] between two bounds of the same ground
 _NEARLY = 1.0  # [%] above the cheapest: places that the penalty is applied to one by one
 
 
@@ -44,7 +42,6 @@ class Restriction:
         thrust: greatest share of the greatest thrust that the engine gives.
         arrival: how a landing may end, before the terminal phase.
         clearance: [m] of safe ground around the site.
-        in_view: the first look showed the site.
         gate: [m] height at which the terminal phase begins; 0 without one.
         terminal: [m/s] that the terminal phase spends.
     """
@@ -53,7 +50,6 @@ class Restriction:
     thrust: float
     arrival: Arrival
     clearance: float = 0.0
-    in_view: bool = False
     gate: float = 0.0
     terminal: float = 0.0
 
@@ -81,20 +77,18 @@ def list_restrictions(preset: Preset) -> tuple[Restriction, ...]:
         gate=0.5 * sinking * seconds,
         terminal=(gravity + options.terminal_deceleration) * seconds,
     )
-    clear = replace(
-        gently,
-        name="2 m of safe ground about",
-        clearance=_CLEARANCE,
-        arrival=replace(gently.arrival, half_cell=0.0),
-    )
     return (
         Restriction("every policy", strong, moving),
         Restriction("touchdown at rest", strong, anywhere),
         Restriction("the engine as specified", 1.0, anywhere),
         Restriction("a margin of thrust", weak, anywhere),
         gently,
-        clear,
-        replace(clear, name="ground that the first look shows", in_view=True),
+        replace(
+            gently,
+            name="2 m of safe ground about",
+            clearance=_CLEARANCE,
+            arrival=replace(gently.arrival, half_cell=0.0),
+        ),
     )
 
 
@@ -127,7 +121,8 @@ def bound_episode(study: Study, episode: int) -> FloorRow:
     penalised, odds = math.nan, math.nan
     if can_recognise(scenario):
         penalised, odds = penalise(scenario, *found[0])
-    in_view = floors[-1] <= floors[-2] + _ROUNDING
+    places, losses = found[-1]
+    in_view = bool(losses.size and lies_in_view(scenario, places[int(losses.argmin())]))
     return FloorRow(scenario.tile.number, floors, in_view, penalised, odds)
 
 
@@ -139,18 +134,16 @@ def safe_places(scenario: Scenario, restriction: Restriction) -> Array:
     room = safe_clearance(scenario.tile)
     wanted = min(restriction.clearance, float(room.max()))
     row, column = np.nonzero(scenario.tile.deterministic & (room >= wanted))
-    places = np.column_stack([column, row]).astype(np.float64) + 0.5
-    return places[_shown(scenario, places)] if restriction.in_view else places
+    return np.column_stack([column, row]).astype(np.float64) + 0.5
 
 
-def _shown(scenario: Scenario, places: Array) -> NDArray[np.bool_]:
-    """Shape (n,): which places lie in the square of the first look, and near enough to its vertical."""
+def lies_in_view(scenario: Scenario, place: Array) -> bool:
+    """Whether a place [m], shape (2,), lies in the square of the first look and near enough to its vertical."""
     lidar, position = scenario.preset.lidar, scenario.initial_state.position
     target = ground_point(scenario, scenario.nominal_target)
-    half = 0.5 * lidar.width(position, target)
+    inside = float(np.abs(place - target[:2]).max()) <= 0.5 * lidar.width(position, target)
     reach = math.tan(lidar.off_nadir_limit) * float(position[2] - target[2])
-    inside = np.abs(places - target[:2]).max(axis=1) <= half
-    return inside & (np.hypot(*(places - position[:2]).T) <= reach)
+    return inside and math.hypot(*(place - position[:2])) <= reach
 
 
 def bound_losses(scenario: Scenario, restriction: Restriction) -> tuple[Array, Array]:
