@@ -138,7 +138,7 @@ def safe_places(scenario: Scenario, restriction: Restriction) -> Array:
 
 
 def lies_in_view(scenario: Scenario, place: Array) -> bool:
-    """Whether a place [m], shape (2,), lies in the square of the first look and near enough to its vertical."""
+    """Whether a place [m], shape (2,), lies in the first look: in its square, near enough to the vertical."""
     lidar, position = scenario.preset.lidar, scenario.initial_state.position
     target = ground_point(scenario, scenario.nominal_target)
     inside = float(np.abs(place - target[:2]).max()) <= 0.5 * lidar.width(position, target)

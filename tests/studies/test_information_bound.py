@@ -16,7 +16,7 @@ from hda.flight.episode import begin_flight, fly, observe
 from hda.policies.beliefs.belief import SafetyBelief
 from hda.policies.privileged.oracle import safe_clearance
 from hda.registry import make_policy
-from hda.sensing.lidar import look
+from hda.sensing.lidar import Lidar, look
 from hda.task.presets import find_preset
 from hda.task.scenario import sample_scenario
 from studies.campaign.claimed_folder import FolderError
@@ -115,7 +115,7 @@ def test_the_class_of_a_bound_says_which_cells_it_lands_on() -> None:
 def test_what_the_first_look_shows_is_what_is_read_in_it() -> None:
     """On ground that is safe everywhere the look reads 0 just where it does not see."""
     scenario = sample_scenario("paper", 0, 1)
-    tile, lidar = scenario.tile, scenario.preset.lidar
+    tile, lidar = scenario.tile, Lidar()
     position, target = scenario.initial_state.position, scenario.nominal_target
     silent = np.zeros((lidar.pixels, lidar.pixels), dtype=np.float32)
     seen = look(lidar, position, target, np.ones_like(tile.probability), silent) == 1.0
