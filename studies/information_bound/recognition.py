@@ -10,6 +10,9 @@ Sun, Operations Research 58, 2010).
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import product
 
 import numpy as np
 from scipy.special import log_ndtr, logsumexp
@@ -21,10 +24,12 @@ from hda.ground.tile import Tile
 from hda.sensing.lidar import Lidar, look
 from hda.task.first_target import offers_targets
 from hda.task.observation import Observation
+from hda.task.rules import StartConditions
 from hda.task.scenario import Scenario
 
 MOST_TILES = 100
 """A split with more tiles is not asked."""
+_LATTICE = 10.0  # [m] between places that are tried as first targets
 
 
 def penalised_loss(loss: Array, weights: Array, truth: int, value: Array) -> float:
@@ -51,26 +56,53 @@ def can_recognise(scenario: Scenario) -> bool:
     return exact and few and isinstance(preset.lidar, Lidar)
 
 
-def candidate_tiles(scenario: Scenario) -> list[Tile]:
-    """The tiles of the split over which episodes begin."""
-    preset, split = scenario.preset, scenario.split
-    ground = Ground(preset.terrain, preset.criteria)
-    tiles = (load_tile(ground, number, split) for number in tile_numbers(split, ground))
-    return [tile for tile in tiles if offers_targets(tile, preset.start)]
+@dataclass(frozen=True, eq=False)
+class Candidates:
+    """The tiles of a split over which episodes begin, each as likely as any.
+
+    Attributes:
+        tiles: m of them.
+        density: shape (m,), of a first target on each, up to one factor: one over the share of places in the
+            target area that are first targets.
+    """
+
+    tiles: tuple[Tile, ...]
+    density: Array
 
 
-def log_likelihoods(scenario: Scenario, tiles: list[Tile]) -> Array:
-    """Log-likelihood of the first look over each tile, shape (m,), up to one constant.
+def candidate_tiles(scenario: Scenario) -> Candidates:
+    """The tiles that the episode may lie on, before anything is seen."""
+    preset = scenario.preset
+    return _candidates(Ground(preset.terrain, preset.criteria), scenario.split, preset.start)
+
+
+@lru_cache(maxsize=2)
+def _candidates(ground: Ground, split: str, start: StartConditions) -> Candidates:
+    opened = (load_tile(ground, number, split) for number in tile_numbers(split, ground))
+    tiles = tuple(tile for tile in opened if offers_targets(tile, start))
+    area = np.arange(start.target_area.low, start.target_area.high + 0.5 * _LATTICE, _LATTICE)
+    places = [np.array(place) for place in product(area, repeat=2)]
+    shares = [np.mean([_is_target(tile, place, start) for place in places]) for tile in tiles]
+    return Candidates(tiles, 1.0 / np.maximum(shares, 1.0 / len(places)))
+
+
+def _is_target(tile: Tile, place: Array, start: StartConditions) -> bool:
+    return tile.hazard_share(place, start.hazard_radius) >= start.hazard_share
+
+
+def log_likelihoods(scenario: Scenario, candidates: Candidates) -> Array:
+    """Log-likelihood of first target and first look over each tile, shape (m,), up to one constant.
 
     A tile on whose map the first target is not one, as the ground about it is too safe, has -inf.
     """
     seen = observe(scenario, begin_flight(scenario))
     start, target = scenario.preset.start, scenario.nominal_target
-    fits = [tile.hazard_share(target, start.hazard_radius) >= start.hazard_share for tile in tiles]
     return np.array(
         [
-            _log_likelihood(scenario, seen, tile) if fit else -math.inf
-            for tile, fit in zip(tiles, fits, strict=True)
+            _log_likelihood(scenario, seen, tile) + math.log(density)
+            if _is_target(tile, target, start)
+            else -math.inf
+            for tile, density in zip(candidates.tiles, candidates.density, strict=True)
         ]
     )
 

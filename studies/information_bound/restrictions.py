@@ -161,9 +161,10 @@ def bound_losses(scenario: Scenario, restriction: Restriction) -> tuple[Array, A
 
 def penalise(scenario: Scenario, places: Array, losses: Array) -> tuple[float, float]:
     """The least loss [%] with the penalty for knowing the tile, and the log-odds of the true tile."""
-    tiles = candidate_tiles(scenario)
+    candidates = candidate_tiles(scenario)
+    tiles = candidates.tiles
     truth = [tile.number for tile in tiles].index(scenario.tile.number)
-    likelihood = log_likelihoods(scenario, tiles)
+    likelihood = log_likelihoods(scenario, candidates)
     weights, odds = weigh_tiles(likelihood), log_odds(likelihood, truth)
     least = float(losses.min(initial=FAILURE))
     near = np.flatnonzero(losses <= least + _NEARLY)

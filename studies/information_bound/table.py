@@ -17,6 +17,7 @@ from studies.information_bound.restrictions import FAILURE, FloorRow
 from studies.statistics.moments import collect_moments, mean_intervals
 from studies.statistics.ratios import Interval
 
+_TOLD = 1000  # to one
 _NOTHING = Interval(math.nan, math.nan, math.nan)
 
 
@@ -106,12 +107,11 @@ def tell_recognition(floors: Sequence[FloorRow]) -> str:
     odds = np.array([row.log_odds for row in floors])
     if np.isnan(odds).any():
         return ""
-    told = int((odds > 0.0).sum())
-    most = max(row.penalised - row.floors[0] for row in floors)
-    least = float(odds.min()) / math.log(10.0)
+    told = int((odds > math.log(_TOLD)).sum())
+    rise = float(np.mean([row.penalised - row.floors[0] for row in floors]))
     return (
-        f"the first look tells the tile in {told} of {odds.size} episodes, by odds of 1e{least:.0f} or more;"
-        f" penalised by that, the first bound rises by at most {most:.2g} points in any"
+        f"the first look tells the tile, by {_TOLD} to 1 or more, in {told} of {odds.size} episodes;"
+        f" for policies that settle their cell by it, the first bound rises by {rise:.2g} points"
     )
 
 

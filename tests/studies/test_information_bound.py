@@ -185,8 +185,9 @@ def test_the_likelihood_of_a_look_is_that_of_its_pixels_one_by_one() -> None:
     scenario = sample_scenario(preset, 0, 3)
     seen = observe(scenario, begin_flight(scenario))
     position, target, width = seen.state.position, seen.target, seen.width
-    for tile in candidate_tiles(scenario)[:3]:
-        total = 0.0
+    known = candidate_tiles(scenario)
+    for k, tile in enumerate(known.tiles[:3]):
+        total = math.log(known.density[k])
         for i, j in product(range(6), repeat=2):
             x, y = (target[k] + ((n + 0.5) / 6 - 0.5) * width for k, n in ((0, j), (1, i)))
             height = position[2] - target[2]
@@ -200,7 +201,7 @@ def test_the_likelihood_of_a_look_is_that_of_its_pixels_one_by_one() -> None:
             else:
                 beyond = (true - 1.0) / sigma if read >= 1.0 else -true / sigma
                 total += math.log(0.5 * math.erfc(-beyond / math.sqrt(2.0)))
-        assert log_likelihoods(scenario, [tile])[0] in (pytest.approx(total, rel=1e-6), -math.inf)
+        assert log_likelihoods(scenario, known)[k] in (pytest.approx(total, rel=1e-6), -math.inf)
 
 
 def test_the_first_look_tells_the_tile_and_noise_hides_it() -> None:
@@ -209,9 +210,9 @@ def test_the_first_look_tells_the_tile_and_noise_hides_it() -> None:
     for episode in range(3):
         for setting, least, most in ((preset, 100.0, math.inf), (blind, -4.0, 1.0)):
             scenario = sample_scenario(setting, 0, episode)
-            tiles = candidate_tiles(scenario)
-            likelihood = log_likelihoods(scenario, tiles)
-            truth = [tile.number for tile in tiles].index(scenario.tile.number)
+            known = candidate_tiles(scenario)
+            likelihood = log_likelihoods(scenario, known)
+            truth = [tile.number for tile in known.tiles].index(scenario.tile.number)
             assert least < log_odds(likelihood, truth) <= most
             assert weigh_tiles(likelihood).sum() == pytest.approx(1.0)
 
