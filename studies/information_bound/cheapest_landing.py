@@ -131,7 +131,7 @@ def _least_bound(piece: DualPiece, proof: DualBound) -> float:
     """[m/s] the least bound of a piece over its times; a constant primer's does not fall beyond the grid."""
     case = dual_case(proof.problem, proof.spent_at_most)
     endless = math.isinf(piece.end)
-    end = _LONGER * piece.begin if endless else piece.end
+    end = _LONGER * max(piece.begin, 1.0) if endless else piece.end
     times = np.unique(np.concatenate([np.linspace(0.0, end, _CELLS), [piece.begin]]))
     primer = piece.primer
     if piece.path_multiplier.any():

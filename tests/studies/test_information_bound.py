@@ -77,6 +77,9 @@ def test_a_bound_is_tight_where_it_is_proved(descent: float) -> None:
     plan = guidance.solve_pdg(START, site, target_velocity=(0.0, 0.0, -descent))
     bound = prove_cell(START, site, LANDER, GRAVITY, arrival).at(site[None, :2])[0]
     assert 0.0 <= spent(plan.propellant) - bound < 0.02  # [m/s] of 68
+    assert plan.certificate is not None
+    assert plan.certificate.verified  # by code that shares nothing with the search, and says the same
+    assert bound == pytest.approx(spent(plan.certificate.lower_bound), abs=0.02)
 
 
 def test_the_cheapest_of_many_cells_is_as_good_as_the_least_of_all_plans() -> None:
