@@ -57,6 +57,9 @@ GROUPS: dict[str, dict[str, Command]] = {
         "rare-events": Command(
             "studies.rare_events.command", "RareEvents", "how likely a policy fails, where failures are rare"
         ),
+        "information-bound": Command(
+            "studies.information_bound.command", "InformationBound", "how far from the best possible it is"
+        ),
         "failures": Command("studies.failures.command", "Failures", "why episodes of a comparison failed"),
         "memory": Command("studies.memory.command", "MemoryStudy", "when memory helps an agent"),
         "stability": Command(

@@ -62,6 +62,10 @@ RUNS: dict[str, tuple[list[str], list[str]]] = {
         ["--episodes", "4", "--pilot", "2", "--workers", "1", "--out", "rare"],
         ["rare/table.csv", "rare/causes.md", "rare/rare-events.png"],
     ),
+    "studies.information_bound": (
+        [*SMALL, "--looks", "0", "--out", "bounded"],
+        ["bounded/table.csv", "bounded/table.md"],
+    ),
     "studies.failures": (["--study", "failing", "--out", "failed"], ["failed/failures.csv"]),
     "studies.looks": (
         [

@@ -1,0 +1,126 @@
+"""The steps from what no policy undercuts to what hazard-aware loses, paired, as a table."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from guidance.arrays import Array
+from hda.flight.episode_row import EpisodeRow
+from hda.registry import policy_entry
+from studies.columns import Column
+from studies.information_bound.restrictions import FAILURE, FloorRow
+from studies.statistics.moments import collect_moments, mean_intervals
+from studies.statistics.ratios import Interval
+
+_TOLD = 1000  # to one
+_NOTHING = Interval(math.nan, math.nan, math.nan)
+
+
+@dataclass(frozen=True)
+class StepRow:
+    """One step: a class of policies and its bound, or a policy and its flights.
+
+    Attributes:
+        step: the class in words, or the policy's name.
+        proved: it is a bound.
+        loss: [%] mean of the propellant, a failure counting a whole tank; clustered by tile.
+        rise: [points] above the step before, paired; nan in the first.
+        below: [points] by which it lies below the last step, paired.
+        failures: episodes without success; nan for a bound.
+    """
+
+    step: str
+    proved: bool
+    loss: Interval
+    rise: Interval
+    below: Interval
+    failures: float
+
+
+def flown_losses(rows: Sequence[EpisodeRow]) -> Array:
+    """[%] shape (n,): the propellant of each flight, and a whole tank more where it failed."""
+    return np.array([row.propellant_percent + FAILURE * (not row.success) for row in rows])
+
+
+def list_steps(
+    names: Sequence[str], floors: Sequence[FloorRow], flights: dict[str, Sequence[EpisodeRow]]
+) -> list[StepRow]:
+    """The steps in order: the bounds, from the weakest on, then the flights, as they are given.
+
+    Args:
+        names: of the bounds.
+        floors: of each episode.
+        flights: policy -> its rows over the same episodes; the last one is what all are held against.
+    """
+    tiles = [row.tile for row in floors]
+    found = [(name, True, math.nan) for name in names]
+    losses = [np.array([row.floors[k] for row in floors]) for k in range(len(names))]
+    for name, rows in flights.items():
+        found.append((name, False, float(sum(not row.success for row in rows))))
+        losses.append(flown_losses(rows))
+
+    def tiled(values: Array) -> Interval:
+        return mean_intervals(collect_moments(values, tiles), 0)[1]
+
+    rises = [_NOTHING, *(tiled(after - before) for before, after in pairwise(losses))]
+    return [
+        StepRow(name, proved, tiled(loss), rise, tiled(losses[-1] - loss), failures)
+        for (name, proved, failures), loss, rise in zip(found, losses, rises, strict=True)
+    ]
+
+
+def _mark(row: StepRow) -> str:
+    return " *" if not row.proved and policy_entry(row.step).privileged else ""
+
+
+def _points(key: str, heading: str, value: str) -> Column[StepRow]:
+    return Column(
+        key,
+        heading,
+        lambda row: getattr(row, value),
+        unit="points",
+        interval=True,
+        form="{:+.2f}".format,
+        between=" to ",
+        stem=value,
+    )
+
+
+COLUMNS: tuple[Column[StepRow], ...] = (
+    Column("step", "step", lambda row: row.step, words=True, mark=_mark),
+    Column("kind", "", lambda row: "bound" if row.proved else "flown", words=True, label="kind"),
+    Column("loss_percent", "loss", lambda row: row.loss, 2, "%", interval=True, stem="loss"),
+    _points("rise_points", "above the step before", "rise"),
+    _points("below_points", "below the last step", "below"),
+    Column("failures", "failures", lambda row: row.failures, 0),
+)
+"""A line a step; intervals are clustered by tile."""
+
+
+def tell_recognition(floors: Sequence[FloorRow]) -> str:
+    """What the first looks tell of the map, in words; empty where it was not worked out."""
+    odds = np.array([row.log_odds for row in floors])
+    if np.isnan(odds).any():
+        return ""
+    told = int((odds > math.log(_TOLD)).sum())
+    rise = float(np.mean([row.penalised - row.floors[0] for row in floors]))
+    return (
+        f"the first look tells the tile, by {_TOLD} to 1 or more, in {told} of {odds.size} episodes;"
+        f" for policies that settle their cell by it, the first bound rises by {rise:.2g} points"
+    )
+
+
+def tell_sight(floors: Sequence[FloorRow], best: Sequence[EpisodeRow], last: Sequence[EpisodeRow]) -> str:
+    """What the square of the first look costs, in words: by how much `last` loses more than `best`."""
+    more, seen = flown_losses(last) - flown_losses(best), np.array([row.in_view for row in floors])
+    parts = [
+        f"by {more[group].mean():.2f} points {where}, in {group.sum()} of {seen.size} episodes"
+        for group, where in ((seen, "where the first look shows the cheapest ground"), (~seen, "elsewhere"))
+        if group.any()
+    ]
+    return f"{last[0].policy} loses more than {best[0].policy} " + ", and ".join(parts)

@@ -1,0 +1,269 @@
+"""Bounds on every policy: below every flight, tight where they are proved, and penalties of mean zero."""
+
+import csv
+import math
+from dataclasses import replace
+from itertools import pairwise, product
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import guidance
+from hda.flight.episode import begin_flight, fly, observe
+from hda.policies.beliefs.belief import SafetyBelief
+from hda.policies.privileged.oracle import safe_clearance
+from hda.registry import make_policy
+from hda.sensing.lidar import Lidar, look
+from hda.task.presets import find_preset
+from hda.task.scenario import sample_scenario
+from studies.campaign.claimed_folder import FolderError
+from studies.campaign.monte_carlo import Study
+from studies.information_bound import Arrival, InformationBound, bound_cheapest, penalised_loss
+from studies.information_bound import run_information_bound as run
+from studies.information_bound.cheapest_landing import prove_cell
+from studies.information_bound.command import plan_study
+from studies.information_bound.recognition import (
+    candidate_tiles,
+    log_likelihoods,
+    log_odds,
+    weigh_tiles,
+)
+from studies.information_bound.restrictions import (
+    bound_episode,
+    bound_losses,
+    lies_in_view,
+    list_restrictions,
+    safe_places,
+)
+from studies.information_bound.told import tell_map, told_path, true_square
+
+LANDER, GRAVITY = guidance.PAPER_LANDER, np.array(guidance.MOON_GRAVITY)
+START = guidance.State(np.array([200.0, 100.0, 950.0]), np.array([-8.0, -4.0, -30.0]), 1200.0)
+SMALL = InformationBound(episodes=3, looks=(0, 99), workers=1)
+
+
+def spent(propellant: float) -> float:
+    """[m/s] velocity change that a propellant [kg] is worth."""
+    return -LANDER.exhaust_velocity * math.log1p(-propellant / START.mass)
+
+
+@settings(max_examples=12, deadline=None)
+@given(
+    st.tuples(st.floats(-60.0, 60.0), st.floats(-60.0, 60.0)),
+    st.tuples(st.floats(-0.5, 0.5), st.floats(-0.5, 0.5)),
+    st.floats(0.0, 2.0),
+    st.floats(0.0, 2.0),
+    st.floats(0.0, 2.0 * math.pi),
+)
+def test_no_flight_undercuts_what_was_proved_of_another_cell(
+    moved: tuple[float, float], beside: tuple[float, float], descent: float, drift: float, heading: float
+) -> None:
+    """Whatever the cell, the place in it and the soft speed: a planner's own flight is the witness."""
+    arrival = Arrival(most_descent=2.0, most_drift=2.0, half_cell=0.5)
+    proof = prove_cell(START, np.array([0.0, 0.0, 50.0]), LANDER, GRAVITY, arrival)
+    velocity = (drift * math.cos(heading), drift * math.sin(heading), -descent)
+    end = (moved[0] + beside[0], moved[1] + beside[1], 50.0)
+    plan = guidance.solve_pdg(START, end, target_velocity=velocity)
+    assert proof.at(np.array([moved]))[0] <= spent(plan.propellant) + 1e-6
+
+
+@pytest.mark.parametrize("descent", [0.0, 2.0])
+def test_a_bound_is_tight_where_it_is_proved(descent: float) -> None:
+    site = np.array([0.0, 0.0, 50.0])
+    arrival = Arrival(least_descent=descent, most_descent=descent)
+    plan = guidance.solve_pdg(START, site, target_velocity=(0.0, 0.0, -descent))
+    bound = prove_cell(START, site, LANDER, GRAVITY, arrival).at(site[None, :2])[0]
+    assert 0.0 <= spent(plan.propellant) - bound < 0.02  # [m/s] of 68
+    assert plan.certificate is not None
+    assert plan.certificate.verified  # by code that shares nothing with the search, and says the same
+    assert bound == pytest.approx(spent(plan.certificate.lower_bound), abs=0.02)
+
+
+def test_the_cheapest_of_many_cells_is_as_good_as_the_least_of_all_plans() -> None:
+    places = np.random.default_rng(5).uniform(-150.0, 150.0, (300, 2))
+    targets = np.column_stack([places, np.full(300, 50.0)])
+    plans = guidance.solve_pdg_many(START, targets)
+    burnt = np.array([spent(each) for each in plans.propellant])
+    bound = bound_cheapest(START, places, LANDER, GRAVITY, 50.0, Arrival())
+    assert (bound <= burnt).all()
+    assert bound.min() > burnt.min() - 0.03
+
+
+def test_every_flight_lies_above_the_bounds_that_hold_for_it() -> None:
+    study = plan_study(SMALL)
+    names = ("oracle-fuel", "hazard-aware", "nearest-safe")
+    for episode in range(3):
+        floors = bound_episode(study, episode).floors
+        assert all(before <= after + 0.01 for before, after in pairwise(floors))
+        for name in names:
+            outcome = fly(make_policy(name), sample_scenario("paper", 0, episode)).outcome
+            assert not outcome.success or 100.0 * outcome.propellant_fraction >= floors[0]
+
+
+def test_the_class_of_a_bound_says_which_cells_it_lands_on() -> None:
+    scenario = sample_scenario("paper", 0, 1)
+    tile = scenario.tile
+    first, *_, clear = list_restrictions(scenario.preset)
+    for each in (first, clear):
+        places = safe_places(scenario, each)
+        row, column = (np.floor(places[:, axis]).astype(int) for axis in (1, 0))
+        assert len(places) == (tile.deterministic & (safe_clearance(tile) >= each.clearance)).sum()
+        assert (safe_clearance(tile)[row, column] >= each.clearance).all()
+        assert len(bound_losses(scenario, each)[1]) == len(places)
+
+
+def test_what_the_first_look_shows_is_what_is_read_in_it() -> None:
+    """On ground that is safe everywhere the look reads 0 just where it does not see."""
+    scenario = sample_scenario("paper", 0, 1)
+    tile, lidar = scenario.tile, Lidar()
+    position, target = scenario.initial_state.position, scenario.nominal_target
+    silent = np.zeros((lidar.pixels, lidar.pixels), dtype=np.float32)
+    seen = look(lidar, position, target, np.ones_like(tile.probability), silent) == 1.0
+    offset = ((np.arange(lidar.pixels) + 0.5) / lidar.pixels - 0.5) * lidar.width(position, target)
+    for i, j in product(range(0, lidar.pixels, 7), repeat=2):
+        assert lies_in_view(scenario, target[:2] + np.array([offset[j], offset[i]])) == seen[i, j]
+    assert not lies_in_view(scenario, target[:2] + np.array([0.51 * lidar.width(position, target), 0.0]))
+
+
+def test_a_setting_on_real_ground_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"preset: flights must end on the target plane"):
+        list_restrictions(find_preset("lidar"))
+
+
+def joint_chances(tiles: np.ndarray, right: float) -> tuple[list[tuple[int, ...]], np.ndarray]:
+    """All readings of the cells, and the chance of each with each of equally likely tiles, shape (m, k)."""
+    readings = list(product(range(2), repeat=tiles.shape[1]))
+    agree = tiles[:, None, :] == np.array(readings)[None]
+    return readings, np.where(agree, right, 1.0 - right).prod(axis=2) / len(tiles)
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(0, 2**31), st.floats(0.5, 0.99), st.floats(-1.0, 2.0))
+def test_penalised_bounds_lie_below_the_optimum_and_meet_it_with_the_exact_value(
+    seed: int, right: float, share: float
+) -> None:
+    """A library small enough that dynamic programming over all readings gives the optimum exactly."""
+    rng = np.random.default_rng(seed)
+    tiles, cost = rng.integers(0, 2, (4, 5)), rng.uniform(0.0, 1.0, 5)
+    loss = cost + 3.0 * (1 - tiles)
+    readings, joint = joint_chances(tiles, right)
+    weights = joint / joint.sum(axis=0)
+    optimum = sum(float((joint[:, k] @ loss).min()) for k in range(len(readings)))
+
+    def bound(value: np.ndarray) -> float:
+        return sum(
+            joint[j, k] * penalised_loss(loss, weights[:, k], j, value)
+            for j in range(len(tiles))
+            for k in range(len(readings))
+        )
+
+    clairvoyant = bound(np.zeros_like(loss))
+    assert clairvoyant == pytest.approx(float(loss.min(axis=1).mean()), abs=1e-12)
+    assert clairvoyant <= optimum + 1e-12
+    assert bound(loss) == pytest.approx(optimum, abs=1e-12)
+    assert bound(share * loss + rng.normal(size=loss.shape)) <= optimum + 1e-12
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(0, 2**31), st.floats(0.5, 0.99))
+def test_the_penalty_has_the_mean_zero_for_every_rule_that_goes_by_the_look(seed: int, right: float) -> None:
+    rng = np.random.default_rng(seed)
+    tiles, value = rng.integers(0, 2, (4, 5)), rng.normal(size=(4, 5))
+    readings, joint = joint_chances(tiles, right)
+    weights = joint / joint.sum(axis=0)
+    likeliest = [int(np.argmin(weights[:, k] @ (1 - tiles))) for k in range(len(readings))]
+    any_rule = rng.integers(0, 5, len(readings)).tolist()
+    for rule in (likeliest, any_rule, [2] * len(readings)):
+        peeks = [value[:, s] - weights[:, k] @ value[:, s] for k, s in enumerate(rule)]
+        mean = sum(float(joint[:, k] @ peek) for k, peek in enumerate(peeks))
+        assert mean == pytest.approx(0.0, abs=1e-12)
+
+
+def test_the_likelihood_of_a_look_is_that_of_its_pixels_one_by_one() -> None:
+    preset = find_preset("paper")
+    preset = replace(preset, lidar=replace(preset.lidar, pixels=6, noise=0.4))
+    scenario = sample_scenario(preset, 0, 3)
+    seen = observe(scenario, begin_flight(scenario))
+    position, target, width = seen.state.position, seen.target, seen.width
+    known = candidate_tiles(scenario)
+    for k, tile in enumerate(known.tiles[:3]):
+        total = math.log(known.density[k])
+        for i, j in product(range(6), repeat=2):
+            x, y = (target[k] + ((n + 0.5) / 6 - 0.5) * width for k, n in ((0, j), (1, i)))
+            height = position[2] - target[2]
+            across = math.hypot(x - position[0], y - position[1])
+            if across > math.tan(preset.lidar.off_nadir_limit) * height:
+                continue
+            sigma = 0.4 * math.hypot(across, height) / 500.0
+            true, read = float(tile.probability[int(y), int(x)]), float(seen.safety_map[i, j])
+            if 0.0 < read < 1.0:
+                total -= 0.5 * ((read - true) / sigma) ** 2 + math.log(sigma * math.sqrt(2.0 * math.pi))
+            else:
+                beyond = (true - 1.0) / sigma if read >= 1.0 else -true / sigma
+                total += math.log(0.5 * math.erfc(-beyond / math.sqrt(2.0)))
+        assert log_likelihoods(scenario, known)[k] in (pytest.approx(total, rel=1e-6), -math.inf)
+
+
+def test_the_first_look_tells_the_tile_and_noise_hides_it() -> None:
+    preset = find_preset("paper")
+    blind = replace(preset, lidar=replace(preset.lidar, noise=1e6))
+    for episode in range(3):
+        for setting, least, most in ((preset, 100.0, math.inf), (blind, -4.0, 1.0)):
+            scenario = sample_scenario(setting, 0, episode)
+            known = candidate_tiles(scenario)
+            likelihood = log_likelihoods(scenario, known)
+            truth = [tile.number for tile in known.tiles].index(scenario.tile.number)
+            assert least < log_odds(likelihood, truth) <= most
+            assert weigh_tiles(likelihood).sum() == pytest.approx(1.0)
+
+
+def test_told_at_no_look_is_hazard_aware_and_told_at_the_first_is_the_map() -> None:
+    scenario = sample_scenario("paper", 0, 2)
+    never, own = fly(tell_map(99), scenario), fly(make_policy("hazard-aware"), scenario)
+    assert np.array_equal(never.outcome.touchdown, own.outcome.touchdown)
+    told = fly(tell_map(0), scenario)
+    assert told.outcome.success
+    belief = SafetyBelief.blank(np.array([20.0, 990.0, 50.0]), 40)
+    square, truth = true_square(scenario.tile, belief), scenario.tile.deterministic
+    assert square[:, :20].sum() == 0.0
+    assert square[50:].sum() == 0.0
+    assert np.array_equal(square[:50, 20:] == 1.0, truth[950:, :60])
+
+
+def test_a_path_that_says_no_look_leads_to_no_policy() -> None:
+    import studies.information_bound.told as told
+
+    assert told_path(2).endswith("told:look=2")
+    for name in ("look=-1", "look=x", "sight=2", "look"):
+        with pytest.raises(AttributeError):
+            getattr(told, name)
+
+
+def test_the_command_writes_the_steps_and_goes_on(tmp_path: Path) -> None:
+    options = replace(SMALL, out=tmp_path / "bounded")
+    lines = run(options)
+    assert [line.proved for line in lines] == [True] * 6 + [False] * 4
+    assert lines[-1].step == "hazard-aware"
+    assert lines[-1].below.estimate == 0.0
+    assert lines[0].below.estimate == pytest.approx(sum(line.rise.estimate for line in lines[1:]))
+    table = (options.out / "table.csv").read_bytes()
+    assert len(list(csv.DictReader(table.decode().splitlines()))) == len(lines)
+    with pytest.raises(FolderError):
+        run(options)
+    run(replace(options, resume=True))
+    assert (options.out / "table.csv").read_bytes() == table
+
+
+@pytest.mark.parametrize("looks", [(2, 1), (1, 1), (-1,)])
+def test_looks_that_do_not_rise_are_refused(looks: tuple[int, ...]) -> None:
+    with pytest.raises(ValueError, match=r"looks must be numbers of at least 0, rising"):
+        InformationBound(looks=looks)
+
+
+def test_a_study_flies_what_it_says() -> None:
+    study = plan_study(SMALL)
+    assert isinstance(study, Study)
+    assert study.policies == ("oracle-fuel", "hazard-aware.told-0", "hazard-aware.told-99", "hazard-aware")
