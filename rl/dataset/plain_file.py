@@ -61,7 +61,8 @@ def read_dataset(path: Path) -> Dataset:
         DatasetError: it is missing, damaged or no such file; the message names it.
     """
     try:
-        with np.load(path, allow_pickle=False) as members:
+        # opened here: numpy leaves a damaged archive open
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as members:
             if not isinstance(members, NpzFile) or set(members.files) != {_CARD, *KINDS}:
                 raise DatasetError(f"{path}: is not a dataset of this program")
             card = _read_card(members[_CARD])

@@ -76,6 +76,8 @@ def _train(folder: Path, preset: Preset, settings: AgentSettings, plan: Training
         if checkpoint is not None:
             recorder.restore(restore_checkpoint(checkpoint, algorithm, env))
             progress.console.print(f"resuming {folder} at step {algorithm.num_timesteps}")
+        if isinstance(env, SteppedVectorEnv):
+            progress.console.print("the native batch does not serve this: environments are stepped in turn")
         remaining = plan.steps - algorithm.num_timesteps
         if remaining > 0:
             algorithm.learn(remaining, recorder, log_interval=10**9, reset_num_timesteps=False)

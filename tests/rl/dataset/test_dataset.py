@@ -112,7 +112,7 @@ def test_a_stopped_call_goes_on_to_the_same_bytes(tmp_path: Path, monkeypatch: p
     assert found.transitions.policy.tolist() == [0] * 5 + [1] * 5
     assert found.transitions.episode.tolist() == [*range(5), *range(5)]
     card = json.loads((whole.out / "card.json").read_text())
-    assert card == found.card
+    assert {**card, "format": 1} == found.card
     assert card["policies"][1] == {"name": "random", "weights_sha256": None}
     for place, score in enumerate(card["scores"]):
         own = found.transitions.policy == place
