@@ -94,7 +94,8 @@ def read_seeds(cards: Sequence[Path], runs: Sequence[Path]) -> list[SeedScore]:
     scores: dict[tuple[str, str, int], SeedScore] = {}
     for path in cards:
         training = read_card(path, "actor")["training"]
-        agent, preset = training.get("recipe", path.stem), training["preset"]
+        preset = training["preset"]
+        agent = training.get("recipe", path.stem.removesuffix(f"-{preset}"))
         for entry in training["seeds"]:
             flown = entry["validation"]
             numbers = flown["success_percent"], flown["propellant_percent"]

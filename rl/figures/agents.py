@@ -28,10 +28,10 @@ def draw_agents(options: AgentsFigure) -> Figure:
     """
     seeds = read_seeds(find_cards(options.weights), options.runs)
     tables = read_tables(options.results)
-    agents = list(dict.fromkeys(score.agent for score in seeds))
     presets = list(dict.fromkeys(row.preset for row in tables)) or sorted({s.preset for s in seeds})
     presets = [name for name in presets if not options.presets or name in options.presets]
-    if not agents or not presets:
+    agents = list(dict.fromkeys(score.agent for score in seeds if score.preset in presets))
+    if not agents:
         raise ValueError(
             f"nothing to draw: weights {options.weights}, runs and results name no agent and preset"
         )

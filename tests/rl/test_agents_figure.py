@@ -76,6 +76,15 @@ def test_a_run_is_a_hollow_dot_until_its_seed_has_a_card(tmp_path: Path) -> None
     assert np.array_equal(dot.get_ydata(), [50.0])
 
 
+def test_a_card_without_a_recipe_is_of_the_agent_that_its_name_says() -> None:
+    scores = read_seeds([WEIGHTS_FOLDER / f"td3-lstm{part}.json" for part in ("", "-partial")], [])
+    assert {(score.preset, score.agent) for score in scores} == {
+        ("paper", "td3-lstm"),
+        ("partial", "td3-lstm"),
+    }
+    assert len(scores) == 6
+
+
 def test_a_later_table_replaces_and_marks_are_dropped(results: tuple[Path, Path], tmp_path: Path) -> None:
     newer = tmp_path / "newer"
     newer.mkdir()
