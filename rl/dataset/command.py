@@ -215,7 +215,3 @@ def main() -> None:
     options = tyro.cli(MakeDataset, description=__doc__)
     with one_line_errors():
         run_dataset(options, " ".join(["python -m rl.dataset", *sys.argv[1:]]))
-
-
-if __name__ == "__main__":
-    main()
