@@ -83,12 +83,12 @@ def run_dataset(options: MakeDataset, command: str) -> None:
     identity = {**_check(options), "version": version("lunar-hda")}
     parts = _open_folder(options, identity)
     with Progress() as progress:
-        dataset = _finished(options, identity)
-        if dataset is None:
-            dataset = _fly_dataset(options, {**identity, "command": command}, parts, progress)
+        finished = _finished(options, identity)
+        dataset = finished or _fly_dataset(options, {**identity, "command": command}, parts, progress)
+        if finished is None:
             write_dataset(options.out / "dataset.npz", dataset)
         data, folder = dataset.transitions, options.out / "minari"
-        if options.minari and not folder.exists():
+        if options.minari and (finished is None or not folder.exists()):
             bar = progress.add_task("Minari's file", total=data.length.size)
             write_minari(folder, dataset, partial(progress.advance, bar))
     (options.out / "card.json").write_text(json.dumps(dataset.card, indent=1, sort_keys=True) + "\n")

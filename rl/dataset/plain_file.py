@@ -64,11 +64,11 @@ def read_dataset(path: Path) -> Dataset:
         # opened here: numpy leaves a damaged archive open
         with path.open("rb") as file, np.load(file, allow_pickle=False) as members:
             if not isinstance(members, NpzFile) or set(members.files) != {_CARD, *KINDS}:
-                raise DatasetError(f"{path}: is not a dataset of this program")
+                raise DatasetError("is not a dataset of this program")
             card = _read_card(members[_CARD])
             transitions = Transitions(**{name: members[name] for name in KINDS})
     except DatasetError as error:
-        raise DatasetError(f"{path}: {error}") if str(path) not in str(error) else error from error
+        raise DatasetError(f"{path}: {error}") from error
     except (
         OSError, ValueError, EOFError, KeyError, TypeError, AttributeError, RuntimeError, SyntaxError,
         NotImplementedError, OverflowError, MemoryError, zipfile.BadZipFile, zlib.error,
