@@ -72,6 +72,7 @@ for _name, _options in (("Site", {"guidance": "convex"}), ("Belief", {"sight": "
     gymnasium.register(
         f"LunarHDA-{_name}-v0",
         entry_point="rl.environment.env:LunarHDAEnv",
+        vector_entry_point="rl.environment.native.stepped_vector:SteppedVectorEnv",
         kwargs=_options,
         **_SPECIFICATION,
     )

@@ -44,6 +44,7 @@ GROUPS: dict[str, dict[str, Command]] = {
     "Learn": {
         "train": Command("rl.train", "Command", "train an agent, and make its weights (extra `train`)"),
         "figures": Command("rl.figures.command", "Command", "pictures of trainings, gains and looks"),
+        "dataset": Command("rl.dataset.command", "MakeDataset", "episodes for offline learning"),
         "model-cards": Command("rl.model_cards", "ModelCards", "the shipped weights as a page"),
         "training-speed": Command("rl.training_speed", "TrainingSpeed", "updates a second (extra `train`)"),
     },

@@ -33,6 +33,10 @@ RUNS: dict[str, tuple[list[str], list[str]]] = {
     "hda.flight.film": (["--step", "5", "--width", "300", "--out", "flight.gif"], ["flight.gif"]),
     "hda.look_statistics": (["--episodes", "1", "--rays", "32"], []),
     "hda.terrain": (["--size", "200", "--show", "tile.png"], ["tile.png"]),
+    "rl.dataset": (
+        ["--policies", "random", *SMALL, "--no-minari", "--out", "offline"],
+        ["offline/dataset.npz", "offline/README.md"],
+    ),
     "rl.figures": (["gains", "--out", "gains.png"], ["gains.png"]),
     "rl.model_cards": (["--out", "cards.md"], ["cards.md"]),
     "rl.train": (

@@ -69,7 +69,7 @@ class LandingEnv(gymnasium.Env[ObsType, Array32], Generic[ObsType]):
 
     The objects behind them are `env.unwrapped.outcome` (None in flight), `.steps` and `.scenario`.
 
-    **Many at a time**: `gymnasium.make_vec` (`rl.environment.native.vector_env.LandingVectorEnv`).
+    **Many at a time**: `gymnasium.make_vec` (`rl.environment.native.landing_vector.LandingVectorEnv`).
     `gymnasium.make` truncates after 20 decisions, as the rules of every preset do; for rules that allow more
     pass it `max_episode_steps`.
 

@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING
 from guidance.exports import lazy_exports
 
 if TYPE_CHECKING:
+    from rl.figures.agents import draw_agents
     from rl.figures.flights import draw_comparison, draw_gains
     from rl.figures.learning import draw_reconstruction, draw_training, moving_average
     from rl.figures.options import (
+        AgentsFigure,
         ComparisonFigure,
         GainsFigure,
         ReconstructionFigure,
@@ -20,9 +22,11 @@ if TYPE_CHECKING:
     from rl.figures.shifts import draw_shifts
 
 _HOMES = {
+    "rl.figures.agents": ("draw_agents",),
     "rl.figures.flights": ("draw_comparison", "draw_gains"),
     "rl.figures.learning": ("draw_reconstruction", "draw_training", "moving_average"),
     "rl.figures.options": (
+        "AgentsFigure",
         "ComparisonFigure",
         "GainsFigure",
         "ReconstructionFigure",
@@ -33,11 +37,13 @@ _HOMES = {
 }
 
 __all__ = [
+    "AgentsFigure",
     "ComparisonFigure",
     "GainsFigure",
     "ReconstructionFigure",
     "ShiftsFigure",
     "TrainingFigure",
+    "draw_agents",
     "draw_comparison",
     "draw_gains",
     "draw_reconstruction",

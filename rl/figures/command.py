@@ -5,6 +5,7 @@ python -m rl.figures reconstruction                       # looks above, their r
 python -m rl.figures gains --episode 3                    # gains and rate of time over one episode
 python -m rl.figures comparison --search 300              # agent and fixed gains where they part
 python -m rl.figures shifts --preset lidar                # at what height policies move their targets
+python -m rl.figures agents --results results/paper       # every agent beside rule and optimiser, by seed
 """
 
 from __future__ import annotations
@@ -15,9 +16,11 @@ from typing import Annotated, Any
 import tyro
 
 from guidance.console import one_line_errors, tolerate_encoding
+from rl.figures.agents import draw_agents
 from rl.figures.flights import draw_comparison, draw_gains
 from rl.figures.learning import draw_reconstruction, draw_training
 from rl.figures.options import (
+    AgentsFigure,
     ComparisonFigure,
     GainsFigure,
     ReconstructionFigure,
@@ -32,6 +35,7 @@ Command = (
     | Annotated[GainsFigure, tyro.conf.subcommand("gains")]
     | Annotated[ComparisonFigure, tyro.conf.subcommand("comparison")]
     | Annotated[ShiftsFigure, tyro.conf.subcommand("shifts")]
+    | Annotated[AgentsFigure, tyro.conf.subcommand("agents")]
 )
 
 
@@ -44,6 +48,7 @@ def main() -> None:
         GainsFigure: draw_gains,
         ComparisonFigure: draw_comparison,
         ShiftsFigure: draw_shifts,
+        AgentsFigure: draw_agents,
     }
     with one_line_errors():
         command = tyro.cli(Command, description=__doc__)  # type: ignore[call-overload]

@@ -9,6 +9,7 @@ from typing import Annotated
 import tyro
 
 from guidance.validation import finite_number
+from rl.inference.artefacts import WEIGHTS_FOLDER
 
 _OUT = Path("results/figures")
 
@@ -83,6 +84,27 @@ class ComparisonFigure:
     preset: str = "paper"
     study_seed: int = 0
     out: Path = _OUT / "comparison.png"
+
+
+@dataclass(frozen=True)
+class AgentsFigure:
+    """Every learnt agent beside a rule and an optimiser, on each preset, by training seed.
+
+    Attributes:
+        results: folders of `studies.compare` and `studies.realism`, whose `table.csv` gives the intervals.
+        runs: run folders, for seeds that no card names; as last judged on the tuning tiles.
+        weights: folder with the cards of exported weights.
+        beside: policies that are not learnt, drawn as lines.
+        presets: to draw; all by default.
+        out: picture to write.
+    """
+
+    results: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="DIR ...")] = ()
+    runs: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="DIR ...")] = ()
+    weights: Annotated[Path, tyro.conf.arg(metavar="DIR")] = WEIGHTS_FOLDER
+    beside: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME ...")] = ("nearest-safe", "hazard-aware")
+    presets: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME ...")] = ()
+    out: Path = _OUT / "agents.png"
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ import numpy as np
 from guidance.arrays import Array
 from hda.policy import Decision
 from hda.task.observation import Observation, ScenarioView
+from rl.inference.arrays import Array32
 from rl.inference.artefacts import WEIGHTS_FOLDER, Artefact, load_artefact
 from rl.inference.networks import Perceptron
 from rl.policies.actor_design import THRUST, ActorDesign, bound_action
@@ -36,11 +37,15 @@ class Actor:
         """Memory before the first look."""
         return self.design.begin(view)
 
+    def act(self, observation: Observation, memory: tuple[Any, Any]) -> tuple[Array32, tuple[Any, Any]]:
+        """Action in [-1, 1], shape (a,), and the memory after the look; the steering's is as it was."""
+        vector, seen = self.design.sight.see(observation, memory[0])
+        return bound_action(self.network.evaluate(vector), self.design.algorithm), (seen, memory[1])
+
     def decide(self, observation: Observation, memory: tuple[Any, Any]) -> tuple[Decision, tuple[Any, Any]]:
         """Decision of the action, and the memory for the next."""
-        vector, seen = self.design.sight.see(observation, memory[0])
-        action = bound_action(self.network.evaluate(vector), self.design.algorithm)
-        decision, steered = self.design.steering.decide(action, observation, memory[1])
+        action, (seen, steered) = self.act(observation, memory)
+        decision, steered = self.design.steering.decide(action, observation, steered)
         return decision, (seen, steered)
 
 

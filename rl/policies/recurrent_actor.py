@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -66,8 +66,8 @@ class MemoryActor:
         action = np.zeros(self.network.actions, np.float32)
         return FlightMemory(self.design.begin(view), view.lander.dry_mass, zero, zero, action)
 
-    def decide(self, observation: Observation, memory: FlightMemory) -> tuple[Decision, FlightMemory]:
-        """Decide, and remember."""
+    def act(self, observation: Observation, memory: FlightMemory) -> tuple[Array32, FlightMemory]:
+        """Action in [-1, 1], shape (a,), and what is remembered; the steering's memory is as it was."""
         design = self.design
         vector, seen = design.sight.see(observation, memory.parts[0])
         mass = observation.state.mass
@@ -75,9 +75,16 @@ class MemoryActor:
         history = np.concatenate([vector, *(beside[part] for part in self.network.history)])
         inputs, hidden, cell = self.network.evaluate(vector, history, (memory.hidden, memory.cell))
         action = bound_action(inputs, design.algorithm)
-        decision, steered = design.steering.decide(action, observation, memory.parts[1])
         first = mass if memory.first_mass is None else memory.first_mass
-        return decision, FlightMemory((seen, steered), memory.dry_mass, hidden, cell, action, first, mass)
+        parts = seen, memory.parts[1]
+        return action, FlightMemory(parts, memory.dry_mass, hidden, cell, action, first, mass)
+
+    def decide(self, observation: Observation, memory: FlightMemory) -> tuple[Decision, FlightMemory]:
+        """Decide, and remember."""
+        action, after = self.act(observation, memory)
+        seen, steered = after.parts
+        decision, steered = self.design.steering.decide(action, observation, steered)
+        return decision, replace(after, parts=(seen, steered))
 
 
 def memory_actor_from_artefact(artefact: Artefact, path: Path) -> MemoryActor:

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import torch
 
-from rl.environment.native.vector_env import LandingVectorEnv
+from rl.environment.native.landing_vector import LandingVectorEnv
 from rl.environment.native.vector_snapshot import restore_snapshot, take_snapshot
 from rl.inference.artefacts import Artefact, ArtefactError, Tensors, load_artefact, read_card, save_artefact
 from rl.learning.recurrent.td3_lstm import RecurrentTD3

@@ -14,7 +14,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 
 from hda.task.presets import Preset
 from rl.environment.env import LandingEnv
-from rl.environment.native.vector_env import LandingVectorEnv
+from rl.environment.native.landing_vector import LandingVectorEnv
 from rl.inference.arrays import Array32
 from rl.inference.artefacts import save_artefact
 from rl.settings import AgentSettings, OnPolicySettings

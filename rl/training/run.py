@@ -11,7 +11,10 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, Ti
 
 from hda.task.presets import Preset
 from rl.environment.env import LandingEnv, LunarHDAEnv
-from rl.environment.native.vector_env import LandingVectorEnv, LunarHDAVectorEnv
+from rl.environment.native.batch_settings import is_served
+from rl.environment.native.landing_vector import LandingVectorEnv
+from rl.environment.native.stepped_vector import SteppedVectorEnv
+from rl.environment.native.vector_env import LunarHDAVectorEnv
 from rl.environment.thrust.thrust_env import LunarHDAThrustEnv
 from rl.environment.thrust.thrust_vector_env import LunarHDAThrustVectorEnv
 from rl.inference.arrays import Array32
@@ -73,6 +76,8 @@ def _train(folder: Path, preset: Preset, settings: AgentSettings, plan: Training
         if checkpoint is not None:
             recorder.restore(restore_checkpoint(checkpoint, algorithm, env))
             progress.console.print(f"resuming {folder} at step {algorithm.num_timesteps}")
+        if isinstance(env, SteppedVectorEnv):
+            progress.console.print("the native batch does not serve this: environments are stepped in turn")
         remaining = plan.steps - algorithm.num_timesteps
         if remaining > 0:
             algorithm.learn(remaining, recorder, log_interval=10**9, reset_num_timesteps=False)
@@ -83,10 +88,13 @@ def _train(folder: Path, preset: Preset, settings: AgentSettings, plan: Training
 def make_environment(
     settings: AgentSettings, preset: Preset
 ) -> LandingEnv[Array32] | LandingVectorEnv[Array32]:
-    """What an agent learns in: one environment, or all in one batch for what learns from many at a time.
+    """What an agent learns in: one environment, or a vector for what learns from many at a time.
+
+    The vector is one native batch where that serves preset, sight and guidance; else its environments are
+    stepped one after the other.
 
     Raises:
-        ValueError: a batch does not serve the preset, or the settings do not go together.
+        ValueError: thrusts on a preset that is not served, or settings that do not go together.
     """
     options: dict[str, Any] = {"layout": settings.layout, "action_ranges": settings.action_ranges}
     options["encoder"] = settings.encoder
@@ -97,12 +105,9 @@ def make_environment(
         return LunarHDAThrustEnv(preset, **options)
     options |= {"sight": settings.sight, "guidance": settings.guidance}
     if isinstance(settings, OnPolicySettings):
-        if (settings.sight, settings.guidance) != ("look", "zem-zev"):
-            raise ValueError(
-                f"{settings.algorithm} does not learn with sight {settings.sight} and guidance"
-                f" {settings.guidance}: take td3-belief, td3-convex or td3-belief-convex"
-            )
-        return LunarHDAVectorEnv(settings.environments, preset=preset, **options)
+        native = is_served(preset) and (settings.sight, settings.guidance) == ("look", "zem-zev")
+        kind = LunarHDAVectorEnv if native else SteppedVectorEnv
+        return kind(settings.environments, preset=preset, **options)
     return LunarHDAEnv(preset, **options)
 
 

@@ -1,4 +1,4 @@
-"""A native vector environment as Stable-Baselines3 wants it."""
+"""A vector environment of this package as Stable-Baselines3 wants it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from gymnasium.vector import AutoresetMode
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvObs, VecEnvStepReturn
 
-from rl.environment.native.vector_env import LandingVectorEnv
+from rl.environment.native.landing_vector import LandingVectorEnv
 
 
 class StableBaselinesVector(VecEnv):
@@ -35,7 +35,7 @@ class StableBaselinesVector(VecEnv):
         if landing.autoreset_mode is not AutoresetMode.SAME_STEP:
             raise ValueError(f"vector must have autoreset_mode='SameStep', got {landing.autoreset_mode}")
         self.vector = landing
-        self._actions = np.zeros((landing.num_envs, 5), np.float32)
+        self._actions = np.zeros(landing.action_space.shape or (), np.float32)
         super().__init__(landing.num_envs, landing.single_observation_space, landing.single_action_space)
 
     def reset(self) -> VecEnvObs:
@@ -65,7 +65,7 @@ class StableBaselinesVector(VecEnv):
         super().set_options(options)
 
     def step_async(self, actions: np.ndarray) -> None:
-        """Keep the actions, shape (n, 5)."""
+        """Keep the actions, shape (n, a)."""
         self._actions = actions
 
     def step_wait(self) -> VecEnvStepReturn:

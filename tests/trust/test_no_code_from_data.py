@@ -20,7 +20,7 @@ BANNED_MODULES = {
 BANNED_BUILTINS = {"__import__", "compile", "eval", "exec"}
 BANNED_NAMES = {
     "code.interact", "ctypes.CDLL", "ctypes.cdll", "importlib.import_module",
-    "importlib.util.spec_from_file_location",
+    "gymnasium.envs.registration.EnvSpec.from_json", "importlib.util.spec_from_file_location",
     "numpy.lib.format.read_array", "os.execv", "os.popen", "os.system", "pandas.eval", "pandas.read_hdf",
     "pandas.read_pickle", "pty.spawn", "runpy.run_module", "runpy.run_path", "subprocess.getoutput",
     "subprocess.getstatusoutput", "torch.hub.load", "torch.jit.load", "torch.load", "torch.package",
@@ -28,6 +28,7 @@ BANNED_NAMES = {
 }  # fmt: skip
 BANNED_ATTRIBUTES = {
     "load_replay_buffer",
+    "recover_environment",
     "read_pickle",
     "read_hdf",
     "to_pickle",
@@ -42,6 +43,7 @@ ALLOWED: dict[tuple[str, str], str] = {
     ("guidance/exports.py", "importlib.import_module"): "modules of these packages, by fixed names",
     ("hda/registry.py", "importlib.import_module"): "the policy that the user names: package.module:Name",
     ("hda/registry.py", ".load() of an entry point"): "policies of installed packages",
+    ("rl/dataset/minari_file.py", "importlib.import_module"): "an optional library, by a fixed name",
     ("studies/launcher.py", "importlib.import_module"): "commands of these packages, by fixed names",
     ("hda/flight/film.py", "importlib.import_module"): "the agents, by a fixed name, as an entry point would",
     ("studies/timing/gfold_peer.py", "importlib.import_module"): "an optional peer, by a fixed name",
@@ -178,6 +180,8 @@ def test_every_package_is_looked_at() -> None:
         "from stable_baselines3 import TD3\nTD3.load('x')",
         "from stable_baselines3.common.save_util import load_from_zip_file\nload_from_zip_file('x')",
         "model.load_replay_buffer('x')",
+        "dataset.recover_environment()",
+        "from gymnasium.envs.registration import EnvSpec\nEnvSpec.from_json('{}')",
         "import importlib\nimportlib.import_module(name)",
         "def read(point):\n    return point.load()",
     ],

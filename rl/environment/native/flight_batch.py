@@ -10,9 +10,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from functools import reduce
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,57 +25,15 @@ from hda.flight.episode import begin_flight
 from hda.flight.outcome import Contact, Outcome, RewardTerms, classify, score_step
 from hda.flight.vehicle import FlightStatus
 from hda.sensing.lidar import Lidar
-from hda.task.presets import Preset
 from hda.task.scenario import Scenario, ground_point
-from rl.environment.action import ActionRanges, scale_actions
+from rl.environment.action import scale_actions
 from rl.environment.encoding import SeenFlight
+from rl.environment.native.batch_settings import BatchSettings
 from rl.environment.native.flight_kernels import Flights, Vehicle, fly_decisions, take_look
 from rl.inference.arrays import Array32
 
 REWARD_TERMS = tuple(term.name for term in fields(RewardTerms))
 """The terms of the reward, in the order of the arrays here."""
-
-
-def check_count(name: str, value: object) -> None:
-    """Raise ValueError naming `name` where `value` is no whole number of at least one."""
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1:
-        raise ValueError(f"{name} must be a whole number of at least 1, got {value!r}")
-
-
-def refuse_unserved(preset: Preset) -> None:
-    """Raise ValueError where the kernels cannot fly a preset."""
-    beyond = preset.stance, preset.navigation, preset.body
-    if not isinstance(preset.lidar, Lidar) or any(part is not None for part in beyond):
-        raise ValueError(
-            f"preset must have looks by Algorithm 2, touchdown on the plane, no filter and no body, got"
-            f" {preset.name!r}: gymnasium.make_vec(..., vectorization_mode='sync') flies the others"
-        )
-
-
-@dataclass(frozen=True)
-class BatchSettings:
-    """What the episodes of a batch share.
-
-    Attributes:
-        preset: the setting; its dispersions may differ from episode to episode.
-        count: episodes at a time.
-        action_ranges: what -1 and 1 of an action mean.
-        threads: over which flights and looks are spread; the numbers do not depend on it.
-
-    Raises:
-        ValueError: a batch does not serve the preset, or a number is below one.
-    """
-
-    preset: Preset
-    count: int
-    action_ranges: ActionRanges
-    threads: int = 1
-
-    def __post_init__(self) -> None:
-        """Refuse what the kernels cannot fly."""
-        check_count("num_envs", self.count)
-        check_count("threads", self.threads)
-        refuse_unserved(self.preset)
 
 
 class FlightBatch:
@@ -163,6 +122,15 @@ class FlightBatch:
         if self._look_seed.shape[1] != look.size:  # of a study whose seed has another number of words
             self._look_seed, self._thrust_seed = np.zeros((2, self.settings.count, look.size), np.uint32)
         self._look_seed[place], self._thrust_seed[place] = look, thrust
+
+    def kept(self) -> dict[str, NDArray[Any]]:
+        """What the flights have become, each array with one row for each."""
+        return {name: getattr(self, name).copy() for name in self.KEPT}
+
+    def take_up(self, kept: dict[str, NDArray[Any]]) -> None:
+        """Let the flights be what they had become, after `begin` of each."""
+        for name in self.KEPT:
+            getattr(self, name)[:] = kept[name]
 
     def advance(self, actions: NDArray[np.floating]) -> Array:
         """Fly an action of each episode to the next look or the plane: the rewards, shape (n,).

@@ -1,4 +1,4 @@
-"""Flights of a native vector environment as numbers: kept, and taken up again to the same bit.
+"""Flights of a vector environment as numbers: kept, and taken up again to the same bit.
 
 Ground, starts, noise and thrust errors are drawn anew from the study and the number of each episode, so only
 what the flights have become is kept.
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rl.environment.native.vector_env import LandingVectorEnv
+from rl.environment.native.landing_vector import LandingVectorEnv
 
 
 def take_snapshot(environments: LandingVectorEnv[Any]) -> dict[str, NDArray[Any]]:
@@ -26,8 +26,7 @@ def take_snapshot(environments: LandingVectorEnv[Any]) -> dict[str, NDArray[Any]
     if any(scenario is None for scenario in batch.scenarios) or environments.ended.any():
         raise ValueError("environments must have an episode under way in every row: call reset()")
     numbers = [scenario.streams.episode for scenario in batch.scenarios if scenario is not None]
-    kept = {name: getattr(batch, name).copy() for name in batch.KEPT}
-    kept |= {name: getattr(environments, name).copy() for name in environments.KEPT}
+    kept = batch.kept() | {name: getattr(environments, name).copy() for name in environments.KEPT}
     return {**kept, "episode": np.array(numbers), "next_episode": environments.next_episode.copy()}
 
 
@@ -51,8 +50,8 @@ def restore_snapshot(
     scenarios = [environments.source.scenario(study_seed, int(number), {}) for number in kept["episode"]]
     for place, scenario in enumerate(scenarios):
         batch.begin(place, scenario)
-    for owner in (batch, environments):
-        for name in owner.KEPT:
-            getattr(owner, name)[:] = kept[name]
+    batch.take_up(kept)
+    for name in environments.KEPT:
+        getattr(environments, name)[:] = kept[name]
     environments.next_episode = kept["next_episode"].astype(environments.next_episode.dtype)
     return environments.look_again()

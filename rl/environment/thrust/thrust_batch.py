@@ -14,7 +14,8 @@ from hda.flight.held_thrust import FlightConditions, VehicleLimits, hold_period
 from hda.task.look_noise import draw_symmetric
 from hda.task.scenario import Scenario
 from rl.environment.action import clip_actions
-from rl.environment.native.flight_batch import BatchSettings, FlightBatch
+from rl.environment.native.batch_settings import BatchSettings
+from rl.environment.native.flight_batch import FlightBatch
 from rl.environment.native.flight_kernels import Flights, Vehicle
 from rl.environment.thrust.thrust_action import site_shift, thrust_acceleration
 from rl.inference.arrays import Array32

@@ -22,7 +22,8 @@ from rl.environment.action import clip_actions
 from rl.environment.encoding import LATENT_BOUND, seen_flight
 from rl.environment.env import LandingEnv
 from rl.environment.episode_info import describe_episode
-from rl.environment.native.flight_batch import judge_flight, refuse_unserved
+from rl.environment.native.batch_settings import refuse_unserved
+from rl.environment.native.flight_batch import judge_flight
 from rl.environment.thrust.thrust_action import (
     LOOK_ELEMENTS,
     THRUST_ACTIONS,
@@ -80,7 +81,7 @@ class LunarHDAThrustEnv(LandingEnv[Array32]):
         Raises:
             ValueError: the preset is not served.
         """
-        refuse_unserved(preset)
+        refuse_unserved(preset, "thrusts are flown on paper, hard, partial and presets of their kind")
         bound, place = np.full(LATENT_SIZE, LATENT_BOUND, np.float32), np.ones(len(LOOK_ELEMENTS), np.float32)
         low = np.concatenate([self.layout.low, -bound, -place])
         return spaces.Box(low, np.concatenate([self.layout.high, bound, place]), dtype=np.float32)

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from guidance.arrays import Index
-from rl.environment.native.flight_batch import BatchSettings
-from rl.environment.native.vector_env import LandingVectorEnv, Parts
+from rl.environment.native.landing_vector import Parts
+from rl.environment.native.vector_env import NativeVectorEnv
 from rl.environment.thrust.thrust_action import LookPlace, encode_thrust_flights
 from rl.environment.thrust.thrust_batch import ThrustBatch
 from rl.environment.thrust.thrust_env import LunarHDAThrustEnv
@@ -16,13 +16,14 @@ from rl.inference.arrays import Array32
 from rl.inference.latent import LATENT_SIZE
 
 
-class LunarHDAThrustVectorEnv(LandingVectorEnv[Array32]):
+class LunarHDAThrustVectorEnv(NativeVectorEnv[Array32]):
     """Observations of shape (n, 47); see `LandingVectorEnv` and `LunarHDAThrustEnv`.
 
     A look is taken where ten control periods have passed, or an episode begins or ends; else the latent of
     the last one stays.
     """
 
+    BATCH = ThrustBatch
     KEPT = ("latents",)
     batch: ThrustBatch
     single: LunarHDAThrustEnv
@@ -35,10 +36,6 @@ class LunarHDAThrustVectorEnv(LandingVectorEnv[Array32]):
     def make_single(self, **options: Any) -> LunarHDAThrustEnv:
         """One of them."""
         return LunarHDAThrustEnv(**options)
-
-    def make_batch(self, settings: BatchSettings) -> ThrustBatch:
-        """What flies them."""
-        return ThrustBatch(settings)
 
     def look(self, places: Index) -> Parts:
         """The 47 numbers of each."""

@@ -12,7 +12,8 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 import rl  # noqa: F401 - registers the environments
 from rl.environment.map_env import LunarHDAMapEnv
-from rl.environment.native.vector_env import LandingVectorEnv, LunarHDAMapVectorEnv, LunarHDAVectorEnv
+from rl.environment.native.landing_vector import LandingVectorEnv
+from rl.environment.native.vector_env import LunarHDAMapVectorEnv, LunarHDAVectorEnv
 from rl.inference.artefacts import WEIGHTS_FOLDER, read_card
 from tests.equality import same
 

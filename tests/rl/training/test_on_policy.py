@@ -162,16 +162,6 @@ def test_thrust_goes_with_looks_and_without_memory(tmp_path):
     assert not any(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("changes", [{"sight": "belief"}, {"guidance": "convex"}])
-@pytest.mark.parametrize("name", ["ppo", "recurrent-ppo"])
-def test_proximal_policies_refuse_what_no_batch_serves_and_name_the_recipes_that_learn_it(
-    name, changes, tmp_path
-):
-    with pytest.raises(ValueError, match=f"{name} does not learn with sight .*: take td3-belief, td3-convex"):
-        run_training(tmp_path, PAPER, replace(SMALL[name], **changes), plan(name, 48), resume=False)
-    assert not any(tmp_path.iterdir())
-
-
 @pytest.mark.parametrize("name", NAMES)
 def test_no_run_goes_on_where_the_learning_rate_is_zero(name, tmp_path):
     settings, (_, end) = SMALL[name], SMALL[name].learning_rate_decay
@@ -191,9 +181,10 @@ def test_every_recipe_learns_for_all_steps_of_its_command():
         options.settings.refuse_steps(options.steps)
 
 
-def test_measured_looks_have_no_batch(tmp_path):
-    with pytest.raises(ValueError, match="preset must have looks by Algorithm 2"):
-        run_training(tmp_path, PRESETS["lidar"], SMALL["ppo"], plan("ppo", 48), resume=False)
+def test_thrusts_on_measured_looks_are_refused_with_the_way_out(tmp_path):
+    with pytest.raises(ValueError, match="got 'lidar': thrusts are flown on paper, hard, partial"):
+        run_training(tmp_path, PRESETS["lidar"], SMALL["ppo-thrust"], plan("ppo-thrust", 48), resume=False)
+    assert not any(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("name", sorted(RECIPES))

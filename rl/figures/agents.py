@@ -1,0 +1,115 @@
+"""Every learnt agent beside a rule and an optimiser, on each preset, by training seed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from hda.flight.palette import COLORS, MATPLOTLIB_DASHES, line_style
+from rl.figures.agent_scores import FlownPolicy, SeedScore, find_cards, read_seeds, read_tables
+from rl.figures.options import AgentsFigure
+from rl.figures.sheet import open_figure
+from rl.policies.actor import weights_name
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+MEASURES = {"success": "success [%]", "propellant": "propellant burnt [%]"}
+"""What the panels of a preset show, from above."""
+
+
+def draw_agents(options: AgentsFigure) -> Figure:
+    """Draw success above and propellant below, one column a preset: seeds as dots, tables with intervals.
+
+    Raises:
+        ValueError: there is nothing to draw, or a folder or card is none.
+    """
+    seeds = read_seeds(find_cards(options.weights), options.runs)
+    tables = read_tables(options.results)
+    presets = list(dict.fromkeys(row.preset for row in tables)) or sorted({s.preset for s in seeds})
+    presets = [name for name in presets if not options.presets or name in options.presets]
+    agents = list(dict.fromkeys(score.agent for score in seeds if score.preset in presets))
+    if not agents:
+        raise ValueError(
+            f"nothing to draw: weights {options.weights}, runs and results name no agent and preset"
+        )
+    figure = open_figure((0.42 * len(agents) + 1.0) * len(presets) + 1.6, 7.0)
+    grid: Any = figure.subplots(len(MEASURES), len(presets), sharex=True, sharey="row", squeeze=False)
+    for column, preset in enumerate(presets):
+        flown = {row.policy: row for row in tables if row.preset == preset}
+        own = [score for score in seeds if score.preset == preset]
+        for axes, measure in zip(grid[:, column], MEASURES, strict=True):
+            _draw_lines(axes, flown, options.beside, measure)
+            _draw_agents(axes, agents, flown, own, measure)
+        grid[0, column].set_title(preset)
+        grid[-1, column].set_xticks(range(len(agents)), agents, rotation=90)
+    for axes, label in zip(grid[:, 0], MEASURES.values(), strict=True):
+        axes.set_ylabel(label)
+    named = {
+        label: handle
+        for axes in grid.flat
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
+    }
+    figure.legend(list(named.values()), list(named), loc="outside lower center", ncols=3, frameon=False)
+    return figure
+
+
+def _draw_lines(axes: Axes, flown: dict[str, FlownPolicy], names: Sequence[str], measure: str) -> None:
+    """The policies that are not learnt, as lines with their intervals as bands."""
+    for k, name in enumerate(names):
+        if name not in flown:
+            continue
+        style = line_style(len(COLORS) - 1 - k)
+        middle, low, high = getattr(flown[name], measure)
+        axes.axhline(
+            middle, color=style["color"], linestyle=MATPLOTLIB_DASHES["dash"], linewidth=1.2, label=name
+        )
+        if not math.isnan(low):
+            axes.axhspan(low, high, color=style["color"], alpha=0.12, linewidth=0.0)
+
+
+def _draw_agents(
+    axes: Axes, agents: Sequence[str], flown: dict[str, FlownPolicy], seeds: Sequence[SeedScore], measure: str
+) -> None:
+    """Each agent at its place: what the table says of it, and its seeds."""
+    for judged, face in (("validation", COLORS[0]), ("tuning", "none")):
+        kept = [score for score in seeds if score.judged == judged]
+        if kept:
+            places = [agents.index(score.agent) - 0.15 for score in kept]
+            values = [getattr(score, measure) for score in kept]
+            label = f"a seed, {judged} tiles"
+            axes.plot(
+                places,
+                values,
+                "o",
+                color=COLORS[0],
+                markerfacecolor=face,
+                markersize=4.5,
+                linestyle="",
+                label=label,
+            )
+    for learnt, color, label in (
+        (True, COLORS[1], "weights learnt there, and 95 % interval"),
+        (False, COLORS[2], "weights learnt on paper"),
+    ):
+        rows = [(place, row) for place, agent in enumerate(agents) if (row := _row(flown, agent, learnt))]
+        if rows:
+            values = [getattr(row, measure) for _, row in rows]
+            ends = [[max(0.0, abs(value[end] - value[0])) for value in values] for end in (1, 2)]
+            ends = [[0.0 if math.isnan(end) else end for end in side] for side in ends]
+            places = [place + (0.1 if learnt else 0.25) for place, _ in rows]
+            middles = [value[0] for value in values]
+            axes.errorbar(
+                places, middles, yerr=ends, fmt="D", color=color, markersize=4, capsize=2, label=label
+            )
+    axes.grid(axis="y", alpha=0.25)
+    axes.set_xlim(-0.6, len(agents) - 0.4)
+
+
+def _row(flown: dict[str, FlownPolicy], agent: str, learnt: bool) -> FlownPolicy | None:
+    """An agent's row: of the weights that learnt on the preset, or of those of `paper` flown elsewhere."""
+    preset = next(iter(flown.values())).preset if flown else ""
+    name = weights_name(agent, preset)
+    return flown.get(name) if learnt else flown.get(agent) if name != agent else None

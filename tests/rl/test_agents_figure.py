@@ -1,0 +1,104 @@
+"""The figure of all agents: its dots are the cards' seeds, its intervals those of the tables."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rl.figures import AgentsFigure, draw_agents
+from rl.figures.agent_scores import read_seeds, read_tables
+from rl.inference.artefacts import WEIGHTS_FOLDER, read_card
+from tests.drawing import bar_ends, legend_words, line_data
+
+HEAD = (
+    "policy,preset,episodes,success_percent,success_low,success_high,"
+    "propellant_percent,propellant_percent_low,propellant_percent_high\n"
+)
+
+
+@pytest.fixture
+def results(tmp_path: Path) -> tuple[Path, Path]:
+    paper, real = tmp_path / "paper", tmp_path / "real"
+    paper.mkdir()
+    real.mkdir()
+    (paper / "table.csv").write_text(
+        f"{HEAD}nearest-safe,paper,9,97,96,98,67,66,68\noracle *,paper,9,99,98,100,60,59,61\n"
+        "td3,paper,9,98,97,99,68,67,69\n"
+    )
+    (real / "table.csv").write_text(
+        f"{HEAD}td3,lidar,9,76,72,80,68,67,69\ntd3-lidar,lidar,9,91,88,94,67,66,68\n"
+        "hazard-aware,lidar,9,99,98,100,57,56,58\n"
+    )
+    return paper, real
+
+
+def test_each_preset_has_its_seeds_its_rows_and_its_lines(results: tuple[Path, Path]) -> None:
+    figure = draw_agents(AgentsFigure(results))
+    paper, lidar, *below = figure.axes
+    assert [paper.get_title(), lidar.get_title()] == ["paper", "lidar"]
+    assert [paper.get_ylabel(), below[0].get_ylabel()] == ["success [%]", "propellant burnt [%]"]
+    agents = [text.get_text() for text in below[0].get_xticklabels()]
+    place = agents.index("td3")
+    seeds = read_card(WEIGHTS_FOLDER / "td3-lidar.json", "actor")["training"]["seeds"]
+    for axes, measure in ((lidar, "success_percent"), (below[1], "propellant_percent")):
+        x, y = line_data(axes, "a seed, validation tiles")
+        np.testing.assert_allclose(x, place - 0.15)
+        assert sorted(y) == sorted(seed["validation"][measure] for seed in seeds)
+    bars = {one.get_label(): one for one in lidar.containers}
+    learnt, elsewhere = bars["weights learnt there, and 95 % interval"], bars["weights learnt on paper"]
+    assert np.array_equal(np.stack(bar_ends(learnt)), [[[place + 0.1, 88.0]], [[place + 0.1, 94.0]]])
+    assert np.array_equal(np.stack(bar_ends(elsewhere)), [[[place + 0.25, 72.0]], [[place + 0.25, 80.0]]])
+    assert line_data(lidar, "hazard-aware")[1].tolist() == [99.0, 99.0]
+    assert line_data(paper, "nearest-safe")[1].tolist() == [97.0, 97.0]
+    assert "nearest-safe" not in [line.get_label() for line in lidar.get_lines()]
+    assert {"nearest-safe", "hazard-aware"} <= set(legend_words(figure.legends[0]))
+
+
+def test_a_run_is_a_hollow_dot_until_its_seed_has_a_card(tmp_path: Path) -> None:
+    for seed in (1, 7):
+        folder = tmp_path / str(seed)
+        folder.mkdir()
+        card = {"preset": "lidar", "recipe": "td3", "seed": seed, "settings": {}, "plan": {}}
+        (folder / "run.json").write_text(json.dumps(card))
+        (folder / "validation.csv").write_text(
+            "step,success_percent,propellant_percent\n10,40,70\n20,50,69\n"
+        )
+    cards = [WEIGHTS_FOLDER / "td3-lidar.json"]
+    found = {score.seed: score for score in read_seeds(cards, [tmp_path / "1", tmp_path / "7"])}
+    assert (found[1].judged, found[7].judged) == ("validation", "tuning")
+    assert (found[7].success, found[7].propellant) == (50.0, 69.0)
+    figure = draw_agents(AgentsFigure(runs=(tmp_path / "7",), presets=("lidar",)))
+    (dot,) = [line for line in figure.axes[0].get_lines() if line.get_label() == "a seed, tuning tiles"]
+    assert dot.get_markerfacecolor() == "none"
+    assert np.array_equal(dot.get_ydata(), [50.0])
+
+
+def test_a_card_without_a_recipe_is_of_the_agent_that_its_name_says() -> None:
+    scores = read_seeds([WEIGHTS_FOLDER / f"td3-lstm{part}.json" for part in ("", "-partial")], [])
+    assert {(score.preset, score.agent) for score in scores} == {
+        ("paper", "td3-lstm"),
+        ("partial", "td3-lstm"),
+    }
+    assert len(scores) == 6
+
+
+def test_a_later_table_replaces_and_marks_are_dropped(results: tuple[Path, Path], tmp_path: Path) -> None:
+    newer = tmp_path / "newer"
+    newer.mkdir()
+    (newer / "table.csv").write_text(f"{HEAD}td3,paper,9,50,40,60,68,67,69\n")
+    rows = {(row.preset, row.policy): row for row in read_tables((*results, newer))}
+    assert rows["paper", "td3"].success == (50.0, 40.0, 60.0)
+    assert rows["paper", "oracle"].propellant == (60.0, 59.0, 61.0)
+
+
+def test_what_cannot_be_drawn_is_named(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="holds no table of policies on presets"):
+        draw_agents(AgentsFigure((tmp_path,)))
+    with pytest.raises(ValueError, match="nothing to draw"):
+        draw_agents(AgentsFigure(weights=tmp_path))
+    (tmp_path / "table.csv").write_text("policy,preset\na,b\n")
+    with pytest.raises(ValueError, match="holds no table of policies on presets"):
+        draw_agents(AgentsFigure((tmp_path,)))
