@@ -66,7 +66,7 @@ def test_a_body_is_filmed_under_its_size_and_a_still_shows_one_moment(tmp_path: 
         assert film.n_frames > 7  # pyright: ignore[reportAttributeAccessIssue]
         film.seek(1)
         second = np.asarray(film.convert("RGB")).astype(int)
-    assert (tmp_path / "body.gif").stat().st_size < 1_500_000 / 10
+    assert (tmp_path / "body.gif").stat().st_size < 1_500_000 / 4  # each frame here shows another look
     film_flight("nearest-safe", flown, out=tmp_path / "still.png", film=FilmOptions(at=5.0))
     with Image.open(tmp_path / "still.png") as still:
         assert np.array_equal(np.asarray(still.convert("RGB")).astype(int), second)

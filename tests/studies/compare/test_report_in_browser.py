@@ -117,18 +117,18 @@ def test_the_lander_moves_with_the_time_and_the_newest_look_comes_with_it(
         browser.execute_script(f"{traces} return t.map(one => one.type)")
         == ["mesh3d"] * 2 + ["scatter3d"] * 2
     )
-    height = f"{traces} const feet = Math.min(...t[0].z); return feet"
+    feet = f"{traces} return Math.min(...t[0].z)"
     flight = (
         "const p = document.getElementById('policy').value, e = document.getElementById('episode').value;"
         "return JSON.parse([...document.querySelectorAll('script.flight')]"
         ".find(n => n.dataset.policy === p && n.dataset.episode === e).textContent)"
     )
     data = browser.execute_script(flight)
-    assert browser.execute_script(height) == pytest.approx(data["z"][0], abs=0.1)  # upright at the start
+    assert browser.execute_script(feet) == pytest.approx(data["z"][0], abs=0.1)  # upright at the start
     node = len(data["time"]) // 2
     slide = "const s = document.getElementById('{}'); s.value = {}; s.dispatchEvent(new Event('input'))"
     browser.execute_script(slide.format("moment", node))
-    wait_for(browser, f"{height.replace('return feet', f'return Math.abs(feet - {data["z"][node]}) < 0.1')}")
+    wait_for(browser, f"{traces} return Math.abs(Math.min(...t[0].z) - {data['z'][node]}) < 0.1")
     text = browser.find_element("id", "moment-text").text
     assert text.startswith(f"{data['time'][node]:g} s: {data['thrust'][node]:g} N")
     newest = sum(view["time"] <= data["time"][node] + 0.011 for view in data["looks"])
