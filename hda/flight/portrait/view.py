@@ -70,7 +70,9 @@ def draw_sign(axis: Axes, pose: LanderPose, view: View, place: tuple[float, floa
     """
     drawn = _draw(pose, view, inches)
     drawn.set(offsets=[place], offset_transform=axis.transData)
-    drawn.set_transform(axis.get_figure(root=True).dpi_scale_trans)
+    figure = axis.get_figure(root=True)
+    assert figure is not None
+    drawn.set_transform(figure.dpi_scale_trans)
     drawn.set_in_layout(False)
     axis.add_collection(drawn, autolim=False)
 
