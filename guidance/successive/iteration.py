@@ -27,6 +27,7 @@ _WIDER, _NARROWER = 0.3, 5.0
 _RESTORED = 0.3  # share of the defects that a step may leave to be taken for that alone
 _SETTLED = 4e-6  # promised fall of the objective below which little is left to gain
 _SETTLING_TRUST = 1e-3  # at most, for that promise to mean something
+_ROUNDING_TRUST = 1.0  # beyond it steps are so short that a promise below _SETTLED is rounding
 _POLISHING_TRUST, _MOST_POLISH = 0.03, 6  # small steps, taken until the motion is kept
 _EDGE = 1e-3  # of a time of flight: so near to an edge of its range it is held by it
 _DEFECT = 1e-7  # greatest defect of a flight that keeps the motion
@@ -102,7 +103,8 @@ def iterate_programmes(problem: RigidLandingProblem, units: RigidUnits, guess: I
         elif trusted and (gain > _GOOD * hoped or hoped < _SETTLED):
             trust = max(_LEAST_TRUST, trust * _WIDER)
         elif not trusted:
-            trust = min(_MOST_TRUST, trust * _NARROWER)
+            rounding = trust > _ROUNDING_TRUST and abs(hoped) < _SETTLED  # shorter steps would tell nothing
+            trust = _FIRST_TRUST if rounding else min(_MOST_TRUST, trust * _NARROWER)
     return Ending(now, PlanStatus.LIMIT_REACHED, solves, _what_is_left(defects, solves))
 
 

@@ -1,7 +1,8 @@
 """The simulator: a vehicle between two looks, an episode from look to look, and how it ended.
 
 `fly_legs` is the one loop; the Gymnasium environments step through the same functions. `rigid` is a body
-that must turn, in the vehicle's loop. It imports the task and the seam (`hda.policy`), no policy.
+that must turn, in the vehicle's loop; `portrait` is the lander as pictures show it. It imports the task and
+the seam (`hda.policy`), no policy.
 """
 
 from typing import TYPE_CHECKING

@@ -1,10 +1,11 @@
-"""A flight as an animated GIF: the ground, the look of the moment, the height, frame by frame.
+"""A flight as an animated GIF: the ground, the look of the moment, the height, frame by frame; or one frame.
 
 On a preset with a ranging LIDAR a look is shown as measured: the heights that the lander saw, with their
-holes, its verdict, and the truth beside it.
+holes, its verdict, and the truth beside it; and the lander close by, with its sensor's reach.
 
 python -m hda.flight.film --policy hazard-aware --preset hard --episode 17 --out flight.gif
-python -m hda.flight.film --policy hazard-aware --preset lidar --episode 17 --out flight.gif
+python -m hda.flight.film --policy hazard-aware --preset rigid-body --episode 17 --out flight.gif
+python -m hda.flight.film --policy hazard-aware --preset rigid-body --episode 17 --at 10 --out moment.png
 """
 
 from __future__ import annotations
@@ -44,11 +45,13 @@ class FilmOptions:
         step: [s] of flight between two frames.
         speed: seconds of flight that a second of the film shows.
         width: [pixel] of the film; its height is in proportion.
+        at: [s] a still of this moment of the flight, as a PNG, in place of the film.
     """
 
     step: float = 0.5
     speed: float = 5.0
     width: int = 800
+    at: float | None = None
 
     def __post_init__(self) -> None:
         """Check every field.
@@ -62,6 +65,13 @@ class FilmOptions:
             raise ValueError(f"speed must be positive, got {self.speed}")
         if not 200 <= self.width <= 3000:
             raise ValueError(f"width must lie between 200 and 3000 pixels, got {self.width}")
+        if self.at is not None and not self.at >= 0.0:
+            raise ValueError(f"at must not be negative, got {self.at}")
+
+    @property
+    def suffix(self) -> str:
+        """Of the file."""
+        return ".gif" if self.at is None else ".png"
 
 
 @dataclass(frozen=True)
@@ -82,7 +92,7 @@ class FilmedEpisode:
 
 
 def film_frames(record: EpisodeRecord, options: FilmOptions) -> Iterator[Image]:
-    """Frames of the film of a flight, from its start to its touchdown, as RGB images."""
+    """Frames of the film of a flight, from start to touchdown, as RGB images; or the one of a still."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from PIL import Image
 
@@ -95,13 +105,15 @@ def film_frames(record: EpisodeRecord, options: FilmOptions) -> Iterator[Image]:
 
 
 def frame_times(record: EpisodeRecord, options: FilmOptions) -> Array:
-    """[s] time of flight that each frame shows; the last is the touchdown."""
+    """[s] time of flight that each frame shows; the last is the touchdown, unless it is a still's."""
+    if options.at is not None:
+        return np.array([options.at])
     end = float(record.time[-1])
     return np.append(np.arange(float(record.time[0]), end, options.step), end)
 
 
 def save_frames(path: Path, frames: Sequence[Image], options: FilmOptions) -> None:
-    """Write frames as a GIF that repeats for ever; the last stays for a while.
+    """Write frames as a GIF that repeats for ever, whose last stays for a while; a still as a PNG.
 
     Args:
         path: of the GIF; its folder is made.
@@ -109,15 +121,18 @@ def save_frames(path: Path, frames: Sequence[Image], options: FilmOptions) -> No
         options: how the flight was filmed.
 
     Raises:
-        ValueError: `path` does not end in .gif.
+        ValueError: `path` does not end in .gif, or for a still in .png.
     """
     from PIL.Image import Dither
 
-    _check_name(path)
+    _check_name(path, options)
     palette = _make_palette()  # one for all, so that what stands still is not written again
     drawn = [frame.quantize(palette=palette, dither=Dither.NONE) for frame in frames]
     times = [max(round(1000.0 * options.step / options.speed), 20)] * (len(drawn) - 1) + [_LAST_FRAME]
     path.parent.mkdir(parents=True, exist_ok=True)
+    if options.at is not None:
+        drawn[0].save(path, optimize=True)
+        return
     drawn[0].save(path, save_all=True, append_images=drawn[1:], duration=times, loop=0)
 
 
@@ -139,9 +154,10 @@ def _make_palette() -> Image:
     return palette
 
 
-def _check_name(path: Path) -> None:
-    if path.suffix.lower() != ".gif":
-        raise ValueError(f"out must end in .gif, got {str(path)!r}")
+def _check_name(path: Path, options: FilmOptions) -> None:
+    if path.suffix.lower() != options.suffix:
+        of_a_still = "" if options.at is None else " for a still"
+        raise ValueError(f"out must end in {options.suffix}{of_a_still}, got {str(path)!r}")
 
 
 def film_flight(
@@ -155,7 +171,7 @@ def film_flight(
     Args:
         policy: name of a policy or an agent, or package.module:Name of your own.
         flown: which episode.
-        out: GIF to write.
+        out: GIF to write; of a still, PNG.
         film: how it is filmed.
     """
     from rich.progress import track
@@ -164,7 +180,7 @@ def film_flight(
 
     if policy in AGENTS:
         importlib.import_module("rl")  # as an entry point would: it registers the agents
-    _check_name(out)
+    _check_name(out, film)
     sys.stdout.write(
         f"flying {policy} on {flown.preset}, episode {flown.episode}"
         " (the first flight on a machine compiles)\n"

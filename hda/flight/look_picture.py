@@ -6,11 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from guidance.arrays import Array
 from hda.flight.palette import COLORS
 from hda.flight.picture import draw_true_safety
 from hda.flight.record import EpisodeRecord
-from hda.ground.tile import Tile
 from hda.task.observation import Observation
+from hda.task.scenario import Scenario, ground_point
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -48,7 +49,7 @@ def draw_elevation(axis: Axes, observation: Observation, colors: str = "cividis"
             vmin=float(low),
             vmax=max(float(high), float(low) + 0.1),
         )
-    _frame(axis, observation)
+    _frame(axis, observation.target, observation.width)
 
 
 def draw_verdict(axis: Axes, observation: Observation) -> None:
@@ -63,15 +64,15 @@ def draw_verdict(axis: Axes, observation: Observation) -> None:
         vmin=-0.6,
         vmax=1.2,
     )
-    _frame(axis, observation)
+    _frame(axis, observation.target, observation.width)
 
 
-def draw_truth(axis: Axes, observation: Observation, tile: Tile) -> None:
-    """Draw the true safety over the look's square; safe ground is light."""
-    draw_true_safety(axis, tile)
+def draw_truth(axis: Axes, observation: Observation, scenario: Scenario) -> None:
+    """Draw the true safety over the look's square, where it really lies; safe ground is light."""
+    draw_true_safety(axis, scenario.tile)
     axis.set_xlabel("")
     axis.set_ylabel("")
-    _frame(axis, observation)
+    _frame(axis, ground_point(scenario, observation.target), observation.width)
 
 
 def draw_looks(record: EpisodeRecord, most: int = 6) -> Figure:
@@ -97,9 +98,9 @@ def draw_looks(record: EpisodeRecord, most: int = 6) -> Figure:
         grid = observation.elevation_grid
         draw_elevation(row[0], observation)
         draw_verdict(row[1], observation)
-        draw_truth(row[2], observation, record.scenario.tile)
-        for axis in row:
-            axis.plot(*site[:2], "+", color=COLORS[0], markersize=11, markeredgewidth=1.8)
+        draw_truth(row[2], observation, record.scenario)
+        for axis, place in zip(row, (site, site, ground_point(record.scenario, site)), strict=True):
+            axis.plot(*place[:2], "+", color=COLORS[0], markersize=11, markeredgewidth=1.8)
         height = observation.state.position[2] - observation.target[2]
         cells = 0.0 if grid is None else grid.pixel_size
         row[0].set_title(f"look {number}, {height:.0f} m above the target: heights in cells of {cells:g} m")
@@ -114,10 +115,10 @@ def draw_looks(record: EpisodeRecord, most: int = 6) -> Figure:
     return figure
 
 
-def _frame(axis: Axes, observation: Observation) -> None:
+def _frame(axis: Axes, target: Array, width: float) -> None:
     """Show the look's square alone."""
-    half = 0.5 * observation.width
-    x, y = (float(value) for value in observation.target[:2])
+    half = 0.5 * width
+    x, y = (float(value) for value in target[:2])
     axis.set_xlim(x - half, x + half)
     axis.set_ylim(y - half, y + half)
     axis.tick_params(labelsize="x-small")

@@ -12,7 +12,10 @@ from hda.flight.look_picture import draw_elevation, draw_truth, draw_verdict
 from hda.flight.outcome import ENDINGS
 from hda.flight.palette import COLORS
 from hda.flight.picture import draw_field_of_view, draw_true_safety, shown_ground
+from hda.flight.portrait.pose import LanderPose, find_pose
+from hda.flight.portrait.view import FROM_ABOVE, draw_close, draw_reach, draw_sign, view_beside
 from hda.flight.record import EpisodeRecord
+from hda.task.scenario import ground_point
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -24,7 +27,7 @@ WIDTH = 10.0
 _HEIGHT = 3.9  # [inch]
 _MEASURED_HEIGHT = 7.4  # [inch] of the picture of a flight with measured looks, which has a second row
 
-_FLAME = 0.012  # [m/N] of the line that stands for the thrust
+_SIGN = 0.3  # [inch] of the lander beside its path
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +40,7 @@ class Moment:
         path: shape (n, 7), position [m], velocity [m/s] and mass [kg] up to now; the last row is now.
         look: number of the look that guides the flight now.
         thrust: [N] size of the thrust that is applied now; 0 once the flight is over.
+        pose: how the lander stands.
     """
 
     record: EpisodeRecord
@@ -44,6 +48,7 @@ class Moment:
     path: Array
     look: int
     thrust: float
+    pose: LanderPose
 
 
 def find_moment(record: EpisodeRecord, time: float) -> Moment:
@@ -60,13 +65,15 @@ def find_moment(record: EpisodeRecord, time: float) -> Moment:
     interval = int(np.searchsorted(record.time, time, side="right")) - 1
     over = interval >= len(record.thrust)
     thrust = 0.0 if over else float(np.linalg.norm(record.thrust[interval]))
-    return Moment(record, time, path, int(np.searchsorted(looks, time, side="right")) - 1, thrust)
+    look = int(np.searchsorted(looks, time, side="right")) - 1
+    return Moment(record, time, path, look, thrust, find_pose(record, time))
 
 
 def draw_moment(moment: Moment) -> Figure:
     """Draw a moment: the ground with the flight so far, the look that guides it, its height.
 
-    Of a measured look the heights that the lander saw, its verdict and the truth stand side by side.
+    The lander is shown in its place, not to scale, as `hda.flight.portrait.pose` says. Of a measured look the
+    heights that the lander saw, its verdict and the truth stand side by side, and the lander close by.
 
     Returns:
         The figure, not tied to any window.
@@ -76,8 +83,9 @@ def draw_moment(moment: Moment) -> Figure:
     measured = moment.record.observations[moment.look].ground is not None
     figure = Figure(figsize=(WIDTH, _MEASURED_HEIGHT if measured else _HEIGHT), layout="constrained")
     if measured:
-        axes = figure.subplot_mosaic([["ground", "height", "height"], ["seen", "verdict", "truth"]])
+        axes = figure.subplot_mosaic([["ground", "lander", "height"], ["seen", "verdict", "truth"]])
         _draw_measured_look(axes["seen"], axes["verdict"], axes["truth"], moment)
+        _draw_lander(axes["lander"], moment)
         ground, height = axes["ground"], axes["height"]
     else:
         ground, view, height = figure.subplots(1, 3)
@@ -91,11 +99,12 @@ def draw_moment(moment: Moment) -> Figure:
 def _draw_ground(axis: Axes, moment: Moment) -> None:
     record, path = moment.record, moment.path
     draw_true_safety(axis, record.scenario.tile)
-    draw_field_of_view(axis, record.observations[moment.look])
-    site = record.decisions[moment.look].site
+    draw_field_of_view(axis, record.observations[moment.look], record.scenario)
+    site = ground_point(record.scenario, record.decisions[moment.look].site)
     axis.plot(path[:, 0], path[:, 1], color=COLORS[1], label="flight")
     axis.plot(*site[:2], "o", color=COLORS[5], markersize=5, label="target")
-    axis.plot(path[-1, 0], path[-1, 1], "^", color=COLORS[1], markersize=7, label="lander")
+    draw_reach(axis, moment.pose, record.scenario)
+    draw_sign(axis, moment.pose, FROM_ABOVE, (path[-1, 0], path[-1, 1]), _SIGN)
     west, east, south, north = shown_ground(record)
     axis.set_xlim(west, east)
     axis.set_ylim(south, north)
@@ -126,10 +135,16 @@ def _draw_measured_look(seen: Axes, verdict: Axes, truth: Axes, moment: Moment) 
     observation, site = record.observations[moment.look], record.decisions[moment.look].site
     draw_elevation(seen, observation, "gray")
     draw_verdict(verdict, observation)
-    draw_truth(truth, observation, record.scenario.tile)
-    for axis in (seen, verdict, truth):
+    draw_truth(truth, observation, record.scenario)
+    for axis, place in ((seen, site), (verdict, site), (truth, ground_point(record.scenario, site))):
         axis.plot(
-            *site[:2], "o", color=COLORS[5], markersize=8, fillstyle="none", markeredgewidth=2, label="target"
+            *place[:2],
+            "o",
+            color=COLORS[5],
+            markersize=8,
+            fillstyle="none",
+            markeredgewidth=2,
+            label="target",
         )
         axis.set_xticks([])
         axis.set_yticks([])
@@ -139,20 +154,26 @@ def _draw_measured_look(seen: Axes, verdict: Axes, truth: Axes, moment: Moment) 
     truth.set_title("truth there, light: safe", fontsize="medium")
 
 
+def _draw_lander(axis: Axes, moment: Moment) -> None:
+    pose, record = moment.pose, moment.record
+    draw_close(axis, pose, record.scenario, ground_point(record.scenario, record.decisions[moment.look].site))
+    leans = "" if record.body_path is None else f"leans {np.degrees(pose.tilt):.0f} deg, "
+    axis.set_title(f"lander: {leans}throttle {100.0 * pose.throttle:.0f} %", fontsize="medium")
+    axis.legend(loc="upper left", fontsize="x-small", framealpha=0.9)
+
+
 def _draw_height(axis: Axes, moment: Moment) -> None:
     record, path = moment.record, moment.path
     end = record.outcome.touchdown
     distance, height = np.linalg.norm(path[:, :2] - end[:2], axis=1), path[:, 2] - end[2]
     axis.plot(distance, height, color=COLORS[1], label="flight")
-    flame = [height[-1], height[-1] - _FLAME * moment.thrust]
-    axis.plot([distance[-1]] * 2, flame, color=COLORS[4], linewidth=4, label="thrust")
-    axis.plot(distance[-1], height[-1], "^", color=COLORS[1], markersize=7, label="lander")
+    draw_sign(axis, moment.pose, view_beside(record.scenario), (distance[-1], height[-1]), _SIGN)
     farthest = float(np.linalg.norm(record.position[:, :2] - end[:2], axis=1).max())
     axis.set_xlim(-0.1 * farthest - 1.0, 1.1 * farthest + 1.0)
     axis.set_ylim(0.0, 1.05 * float((record.position[:, 2] - end[2]).max()))
     axis.set_xlabel("distance to the touchdown [m]")
     axis.set_ylabel("height [m]")
-    axis.set_title("height; bar: thrust", fontsize="medium")
+    axis.set_title("height; flame: thrust", fontsize="medium")
     axis.grid(alpha=0.25)
 
 

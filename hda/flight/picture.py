@@ -12,6 +12,7 @@ from hda.flight.palette import COLORS
 from hda.flight.record import EpisodeRecord
 from hda.ground.tile import Tile
 from hda.task.observation import Observation
+from hda.task.scenario import Scenario, ground_point
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -83,7 +84,7 @@ def draw_ground_track(axis: Axes, record: EpisodeRecord) -> None:
     """Draw a flight over the true safety map, with its targets and its field of view at each look."""
     draw_true_safety(axis, record.scenario.tile)
     for observation in record.observations:
-        draw_field_of_view(axis, observation)
+        draw_field_of_view(axis, observation, record.scenario)
     sites = flown_sites(record)
     axis.plot(record.position[:, 0], record.position[:, 1], color=COLORS[1], label="flight")
     axis.plot(sites[:, 0], sites[:, 1], "o-", color=COLORS[0], markersize=4, linewidth=0.8, label="targets")
@@ -96,8 +97,9 @@ def draw_ground_track(axis: Axes, record: EpisodeRecord) -> None:
 
 
 def flown_sites(record: EpisodeRecord) -> Array:
-    """[m] shape (decisions + 1, 3), the first target and then the site of each decision."""
-    return np.array([record.scenario.nominal_target, *(decision.site for decision in record.decisions)])
+    """[m] shape (decisions + 1, 3), first target and the site of each decision, on the true ground."""
+    sites = [record.scenario.nominal_target, *(decision.site for decision in record.decisions)]
+    return np.array([ground_point(record.scenario, site) for site in sites])
 
 
 def shown_ground(record: EpisodeRecord) -> tuple[float, float, float, float]:
@@ -117,10 +119,11 @@ def draw_true_safety(axis: Axes, tile: Tile) -> None:
     axis.set_ylabel("north [m]")
 
 
-def draw_field_of_view(axis: Axes, observation: Observation) -> None:
-    """Draw the square that a look covers, about its target."""
+def draw_field_of_view(axis: Axes, observation: Observation, scenario: Scenario) -> None:
+    """Draw the square that a look covers, about its target, on the true ground."""
     from matplotlib.patches import Rectangle
 
-    east, north = (float(value) for value in observation.target[:2] - observation.width / 2.0)
+    east, north = (float(value) for value in ground_point(scenario, observation.target)[:2])
     side = observation.width
-    axis.add_patch(Rectangle((east, north), side, side, fill=False, color=COLORS[4]))
+    corner = (east - 0.5 * side, north - 0.5 * side)
+    axis.add_patch(Rectangle(corner, side, side, fill=False, color=COLORS[4]))

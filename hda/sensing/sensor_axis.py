@@ -18,6 +18,24 @@ def sensor_axis(attitude: Array) -> Array:
     return -rotate(attitude, np.array([0.0, 0.0, 1.0]))
 
 
+def cone_rim(axis: Array, limit: float, rays: int) -> Array:
+    """Unit vectors along the edge of the cone about an axis.
+
+    Args:
+        axis: unit vector, shape (3,), site frame.
+        limit: [rad] the cone's half-angle.
+        rays: how many, evenly around; the last is the first again.
+
+    Returns:
+        Shape (rays, 3).
+    """
+    turns = np.linspace(0.0, 2.0 * np.pi, rays)
+    across = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
+    across /= np.linalg.norm(across)
+    around = np.outer(np.cos(turns), across) + np.outer(np.sin(turns), np.cross(axis, across))
+    return np.cos(limit) * axis + np.sin(limit) * around
+
+
 @compile_kernel
 def is_outside(axis: Array | None, limit: float, ray: tuple[float, float, float], across: float) -> bool:
     """Whether a ray leaves the cone about the axis.

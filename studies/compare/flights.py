@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import BrokenExecutor, Executor
 from dataclasses import dataclass
@@ -15,10 +16,13 @@ from numpy.typing import ArrayLike, NDArray
 from hda.flight.episode import fly
 from hda.flight.outcome import ENDINGS
 from hda.flight.picture import save_flight
+from hda.flight.portrait.pose import engine_attitudes
+from hda.flight.portrait.shape import NOZZLE, Surface, lander_surface, plume_surface
 from hda.flight.record import EpisodeRecord
 from hda.ground.tile import Tile
 from hda.policy import ZemZevCommand
-from hda.task.scenario import sample_scenario
+from hda.task.presets import Preset
+from hda.task.scenario import ground_point, sample_scenario
 from studies.campaign.monte_carlo import Study
 from studies.compare.scores import StudyScores
 
@@ -28,6 +32,7 @@ _GROUND_CELLS = 72
 _GROUND_CELL = 8  # [m] a terrain patch of 576 m holds every start (250 m from its target)
 _TRUTH_CELLS = 200  # cells of 1 m around the first target whose true safety is shown
 _MOST_NODES = 240
+_ENLARGED = 8  # times its size that a lander is drawn: at its own it is a few pixels beside 900 m of height
 
 
 @dataclass(frozen=True)
@@ -133,14 +138,15 @@ def reduce_flight(record: EpisodeRecord) -> FlightPicture:
     looks = [
         {
             "time": round(observation.time, 2),
-            "target": _rounded(observation.target[:2], 2),
+            "target": _rounded(ground_point(record.scenario, observation.target)[:2], 2),
             "width": round(observation.width, 2),
             "pixels": observation.safety_map.shape[0],
             "map": pack_levels(observation.safety_map),
         }
         for observation in record.observations
     ]
-    target = record.scenario.nominal_target
+    first = record.scenario.nominal_target
+    aim = ground_point(record.scenario, first)
     data = {
         "time": _rounded(record.time[kept], 2),
         "x": _rounded(record.position[kept, 0], 1),
@@ -148,10 +154,11 @@ def reduce_flight(record: EpisodeRecord) -> FlightPicture:
         "z": _rounded(record.position[kept, 2], 1),
         "speed": _rounded(np.linalg.norm(record.velocity[kept], axis=1), 2),
         "mass": _rounded(record.mass[kept], 2),
+        "attitude": [_rounded(part, 3) for part in engine_attitudes(record)[kept, 1:].T],
         "thrust": _rounded(magnitude[kept[:-1]], 0),
         "looks": looks,
         "decisions": _decisions(record),
-        "nominal": _rounded(target, 1),
+        "nominal": _rounded([*aim[:2], first[2]], 1),
         "touchdown": _rounded(record.outcome.touchdown, 2),
     }
     episode = record.scenario.streams.episode
@@ -167,7 +174,7 @@ def _decisions(record: EpisodeRecord) -> list[dict[str, Any]]:
         shown.append(
             {
                 "time": round(observation.time, 2),
-                "site": _rounded(decision.site[:2], 2),
+                "site": _rounded(ground_point(record.scenario, decision.site)[:2], 2),
                 "gains": _rounded(gains, 3),
                 "law": "ZEM/ZEV" if flies_gains else "plan",
                 "status": str(decision.status),
@@ -197,6 +204,40 @@ def picture_ground(study: Study, episode: int) -> dict[str, Any]:
         "truth_cells": _TRUTH_CELLS,
         "truth": _base64(np.packbits(safe, bitorder="little")),
         "tile": scenario.tile.number,
+    }
+
+
+def picture_lander(preset: Preset) -> dict[str, Any]:
+    """What the page draws of a preset's lander; plain numbers, strings and lists.
+
+    Returns:
+        `body` and `plume` (at full thrust) as surfaces in metres, `enlarged` times; `size` [m], the diameter
+        that this makes; `nozzle` [m], about which the plume turns; `max_thrust` [N]; `reach` [rad] and
+        `reach_deg`, the half-angle of what the sensor can see: about the lander's axis where it is `rigid`,
+        else about the vertical.
+    """
+    size = _ENLARGED * preset.criteria.footprint_diameter
+    return {
+        "body": _plain(lander_surface(), size),
+        "plume": _plain(plume_surface(1.0), size),
+        "nozzle": _rounded(size * NOZZLE, 2),
+        "enlarged": _ENLARGED,
+        "size": size,
+        "max_thrust": preset.lander.max_thrust,
+        "reach": round(preset.lidar.off_nadir_limit, 6),
+        "reach_deg": round(math.degrees(preset.lidar.off_nadir_limit), 1),
+        "rigid": preset.body is not None,
+    }
+
+
+def _plain(surface: Surface, size: float) -> dict[str, Any]:
+    points = np.round(size * surface.vertices, 2)
+    return {
+        "x": points[:, 0].tolist(),
+        "y": points[:, 1].tolist(),
+        "z": points[:, 2].tolist(),
+        "triangles": surface.triangles.T.tolist(),
+        "colors": list(surface.colors),
     }
 
 

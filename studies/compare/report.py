@@ -23,7 +23,7 @@ from studies.compare.charts import (
     line_style,
 )
 from studies.compare.differences import DIFFERENCE_COLUMNS, PairedDifference
-from studies.compare.flights import FlightPicture, picture_ground
+from studies.compare.flights import FlightPicture, picture_ground, picture_lander
 from studies.compare.opening import choose_curves, choose_opening
 from studies.compare.scores import StudyScores
 from studies.compare.table import COLUMNS, REFERENCE_POLICY, PolicySummary, paper_line
@@ -108,11 +108,12 @@ def write_report(path: Path, content: ReportContent, flights: Sequence[FlightPic
         flights=list(flights),
         grounds={str(episode): picture_ground(study, episode) for episode in episodes},
         opening=None if opening is None else asdict(opening),
+        lander=picture_lander(study.preset),
         left_out=find_left_out(content),
         provenance=content.provenance,
         provenance_text=json.dumps(content.provenance, indent=1, sort_keys=True, default=str),
         css=source("report.css"),
-        scripts=[source(name) for name in ("tables.js", "charts.js", "flights.js")],
+        scripts=[source(name) for name in ("tables.js", "charts.js", "lander.js", "flights.js")],
         plotly=Markup(get_plotlyjs().replace("</script", "<\\/script")),
     )
     path.write_text(page, encoding="utf-8")

@@ -1,7 +1,7 @@
 "use strict";
 // The episode browser: one flight, and another of the same episode beside it.
 (function () {
-  const { read, later, config } = Report;
+  const { read, later, config, lander } = Report;
   const element = (id) => document.getElementById(id);
   const grounds = read("grounds-data"), opening = read("opening-data");
   const blue = "#0072B2", vermilion = "#D55E00", green = "#009E73", purple = "#CC79A7", orange = "#E69F00";
@@ -10,7 +10,7 @@
     policy: node.dataset.policy, episode: Number(node.dataset.episode), ending: node.dataset.ending,
     words: node.dataset.words, node,
   }));
-  const policySelect = element("policy"), episodeSelect = element("episode"), besideSelect = element("beside"), look = element("look");
+  const policySelect = element("policy"), episodeSelect = element("episode"), besideSelect = element("beside"), look = element("look"), moment = element("moment");
   if (!flights.length) return;
 
   function bytes(text) { return Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0)); }
@@ -47,6 +47,13 @@
     catch (error) { return false; }
   })();
 
+  // What the 3-D view holds, whatever the lander does in it: the ground, and the flights.
+  function endsOf(flight) {
+    const ground = groundOf(flight.episode), size = ground.cell * ground.cells, shown = [flight, ...(beside ? [beside] : [])].map(dataOf);
+    const ends = (axis, low, high) => [Math.min(low, ...shown.flatMap((data) => data[axis])), Math.max(high, ...shown.flatMap((data) => data[axis]))];
+    const [low, high] = ends("z", ground.low, ground.high);
+    return [ends("x", ground.corner[0], ground.corner[0] + size), ends("y", ground.corner[1], ground.corner[1] + size), [low, high + 0.7 * lander.size]];
+  }
   function drawSpace(flight) {
     const node = element("flight-space");
     if (!webgl) { node.textContent = "This browser has no WebGL, which the 3-D view needs."; return; }
@@ -71,12 +78,21 @@
     const sites = [data.nominal, ...data.decisions.map((decision) => [...decision.site, plane])];
     traces.push({ type: "scatter3d", mode: "lines+markers", x: sites.map((s) => s[0]), y: sites.map((s) => s[1]), z: sites.map(() => plane + 1), line: { color: blue, width: 2 }, marker: { color: blue, size: 3 }, name: "targets" });
     traces.push({ type: "scatter3d", mode: "markers", x: [data.touchdown[0]], y: [data.touchdown[1]], z: [plane + 1], marker: { color: purple, size: 7, symbol: "diamond" }, name: "touchdown" });
+    const ends = endsOf(flight);
+    traces.push(...lander.traces(data, Number(moment.value), ends));
     Plotly.react(node, traces, {
       margin: { l: 0, r: 0, t: 0, b: 0 }, font, legend: { orientation: "h", y: 0, yanchor: "top" }, uirevision: "space",
-      scene: { aspectmode: "data", xaxis: { title: { text: "east [m]" } }, yaxis: { title: { text: "north [m]" } }, zaxis: { title: { text: "up [m]" } }, camera: { eye: { x: 1.1, y: -1.3, z: 0.5 } } },
+      scene: { aspectmode: "data", xaxis: { title: { text: "east [m]" }, range: ends[0] }, yaxis: { title: { text: "north [m]" }, range: ends[1] }, zaxis: { title: { text: "up [m]" }, range: ends[2] }, camera: { eye: { x: 1.3, y: -1.55, z: 0.55 }, center: { x: 0, y: 0, z: -0.12 } } },
     }, config);
   }
 
+  // One moment in both pictures: the lander at a node, and the newest look there.
+  function showMoment(k) {
+    const data = dataOf(current), node = element("flight-space");
+    moment.value = k;
+    element("moment-text").textContent = lander.describe(data, k);
+    if (webgl && node.dataset.shown) lander.move(node, data, k, endsOf(current));
+  }
   function drawMap(flight) {
     const data = dataOf(flight), ground = groundOf(flight.episode), k = Number(look.value), view = data.looks[k];
     const pixel = view.width / view.pixels, half = view.width / 2;
@@ -153,6 +169,9 @@
     element("words").textContent = "Episode " + flight.episode + ": " + flight.words;
     look.max = dataOf(flight).looks.length - 1;
     look.value = 0;
+    moment.max = dataOf(flight).time.length - 1;
+    moment.value = 0;
+    element("moment-text").textContent = lander.describe(dataOf(flight), 0);
     for (const [id, make] of [["flight-space", drawSpace], ["flight-map", drawMap], ["flight-time", drawTime]]) {
       const node = element(id);
       node.dataset.shown = "";
@@ -173,7 +192,12 @@
   const step = (by) => show(flights[(flights.indexOf(current) + by + flights.length) % flights.length], besideSelect.value);
   element("previous").addEventListener("click", () => step(-1));
   element("next").addEventListener("click", () => step(1));
-  look.addEventListener("input", () => drawMap(current));
+  look.addEventListener("input", () => { const data = dataOf(current); showMoment(lander.nodeAt(data, data.looks[Number(look.value)].time)); drawMap(current); });
+  moment.addEventListener("input", () => {
+    const newest = lander.lookAt(dataOf(current), Number(moment.value));
+    showMoment(Number(moment.value));
+    if (newest !== Number(look.value)) { look.value = newest; drawMap(current); }
+  });
   element("controls").addEventListener("submit", (event) => event.preventDefault());
   window.addEventListener("hashchange", showHash);
   if (window.innerWidth < 700) element("flights-in-words").open = false;  // a long way to scroll on a phone

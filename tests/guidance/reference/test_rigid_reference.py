@@ -7,6 +7,7 @@ import pytest
 
 from guidance import Lander, PlanStatus, solve_pdg, solve_pdg_6dof
 from guidance.rigid_body import RigidBody, RigidState, attitude_along
+from guidance.successive.solve import RigidPlanningMethod
 from tests.guidance.rigid_body.rigid_cases import plan_szmuk_case
 
 SITE = np.array([0.0, 0.0, 50.0])
@@ -40,7 +41,8 @@ def test_the_case_of_szmuk_and_acikmese_by_the_reference():
     assert flight.propellant == pytest.approx(0.1427, abs=1e-3)
 
 
-def test_an_agile_body_flies_the_point_mass_case_of_acikmese_and_ploen():
+@pytest.mark.parametrize("method", ["casadi", "successive"])
+def test_an_agile_body_flies_the_point_mass_case_of_acikmese_and_ploen(method: RigidPlanningMethod):
     """The Mars case of JGCD 30(5), 2007, without glide slope and with a free time of flight.
 
     Published: 387.9 kg in 72 s. The body ends upright, and its thrust is linear between 61 nodes where the
@@ -63,8 +65,9 @@ def test_an_agile_body_flies_the_point_mass_case_of_acikmese_and_ploen():
         engine_lag=0.0,
     )
     plan = solve_pdg_6dof(
-        start, (0.0, 0.0, 0.0), agile, gravity=gravity, free_attitude=True, nodes=61, method="casadi"
+        start, (0.0, 0.0, 0.0), agile, gravity=gravity, free_attitude=True, nodes=61, method=method
     )
+    assert plan.keeps_limits
     assert point.propellant == pytest.approx(387.9, rel=0.01)
     assert point.propellant < plan.propellant < 1.012 * point.propellant
 

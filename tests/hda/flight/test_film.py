@@ -58,9 +58,27 @@ def test_a_film_of_measured_looks_keeps_under_its_size(tmp_path: Path) -> None:
     assert 10_000 < out.stat().st_size < 1_500_000 / 6  # the command's own step gives six times the frames
 
 
+def test_a_body_is_filmed_under_its_size_and_a_still_shows_one_moment(tmp_path: Path) -> None:
+    flown = FilmedEpisode("rigid-body", 17)
+    film_flight("nearest-safe", flown, out=tmp_path / "body.gif", film=FilmOptions(step=5.0))
+    with Image.open(tmp_path / "body.gif") as film:
+        assert film.size == (800, 592)
+        assert film.n_frames > 7  # pyright: ignore[reportAttributeAccessIssue]
+        film.seek(1)
+        second = np.asarray(film.convert("RGB")).astype(int)
+    assert (tmp_path / "body.gif").stat().st_size < 1_500_000 / 4  # each frame here shows another look
+    film_flight("nearest-safe", flown, out=tmp_path / "still.png", film=FilmOptions(at=5.0))
+    with Image.open(tmp_path / "still.png") as still:
+        assert np.array_equal(np.asarray(still.convert("RGB")).astype(int), second)
+
+
 def test_what_cannot_be_filmed_is_refused_before_it_flies(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"out must end in \.gif"):
         film_flight(out=tmp_path / "flight.mp4")
+    with pytest.raises(ValueError, match=r"out must end in \.png for a still"):
+        film_flight(out=tmp_path / "flight.gif", film=FilmOptions(at=5.0))
+    with pytest.raises(ValueError, match="at must not be negative"):
+        FilmOptions(at=-1.0)
     with pytest.raises(ValueError, match="step must be positive"):
         FilmOptions(step=0.0)
     with pytest.raises(ValueError, match="speed must be positive"):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from matplotlib.collections import PolyCollection
 
 import hda
 from hda.flight.episode import fly
@@ -64,12 +65,25 @@ def test_the_last_picture_says_how_it_ended(record: EpisodeRecord) -> None:
     assert words not in draw_moment(find_moment(record, 3.0)).get_suptitle()
 
 
+def test_the_lander_is_drawn_where_it_is_over_the_ground_and_beside_its_height(record: EpisodeRecord) -> None:
+    moment = find_moment(record, 12.25)
+    ground, _, height = draw_moment(moment).axes
+    distance, above = line_data(height, "flight")
+    for axis, place in ((ground, moment.path[-1, :2]), (height, (distance[-1], above[-1]))):
+        (lander,) = [each for each in axis.collections if isinstance(each, PolyCollection)]
+        np.testing.assert_allclose(np.asarray(lander.get_offsets()), [place])
+    east, north = line_data(ground, "sensor's reach")
+    off = np.hypot(east - moment.path[-1, 0], north - moment.path[-1, 1])
+    high = moment.path[-1, 2] - record.scenario.nominal_target[2]
+    np.testing.assert_allclose(off, high * np.tan(record.scenario.preset.lidar.off_nadir_limit))
+
+
 def test_a_measured_look_is_shown_beside_the_truth() -> None:
     flown = fly(hda.make_policy("nearest-safe"), hda.sample_scenario("lidar-coarse", 0, 3))
     for time in (1.0, 12.25):
         moment = find_moment(flown, time)
         axes = {axis.get_label(): axis for axis in draw_moment(moment).axes}
-        assert set(axes) == {"ground", "height", "seen", "verdict", "truth"}
+        assert set(axes) == {"ground", "lander", "height", "seen", "verdict", "truth"}
         observation, tile = flown.observations[moment.look], flown.scenario.tile
         shown = {name: axes[name].images[0] for name in ("seen", "verdict", "truth")}
         drawn = {name: np.ma.asarray(image.get_array()) for name, image in shown.items()}

@@ -41,6 +41,23 @@ def test_the_ground_track_shows_the_flight_its_targets_and_every_field_of_view(r
     assert record.position[:, 1].max() <= north
 
 
+def test_what_a_lander_takes_for_a_place_is_drawn_where_it_really_lies() -> None:
+    """`partial` errs about its position by half a metre."""
+    flown = fly(hda.make_policy("nearest-safe"), hda.sample_scenario("partial", 0, 3))
+    error = flown.scenario.navigation_error[:2]
+    assert np.abs(error).max() > 0.01
+    axis = Figure().subplots()
+    draw_ground_track(axis, flown)
+    squares = [patch for patch in axis.patches if isinstance(patch, Rectangle)]
+    for square, observation in zip(squares, flown.observations, strict=True):
+        assert square.get_center() == pytest.approx(observation.target[:2] - error)
+    lines = {line.get_label(): np.column_stack(line.get_data()) for line in axis.lines}
+    sites = np.array([decision.site[:2] for decision in flown.decisions])
+    np.testing.assert_allclose(lines["targets"][1:], sites - error)
+    last = np.hypot(*(lines["targets"][-1] - lines["touchdown"][0]))
+    assert last == pytest.approx(flown.outcome.miss_distance)
+
+
 def test_the_true_map_lies_as_the_ground_does(record: EpisodeRecord) -> None:
     axis = Figure().subplots()
     draw_ground_track(axis, record)

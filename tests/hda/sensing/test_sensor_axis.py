@@ -13,7 +13,7 @@ from guidance.state import State
 from hda.sensing.lidar import Lidar, look
 from hda.sensing.ranging import RangingLidar, scan
 from hda.sensing.scan_draws import draw_scan
-from hda.sensing.sensor_axis import is_outside, sensor_axis
+from hda.sensing.sensor_axis import cone_rim, is_outside, sensor_axis
 
 PLANE = 50.0
 TARGET = np.array([150.0, 150.0, PLANE])
@@ -34,6 +34,17 @@ def test_the_axis_points_down_along_the_body(turn):
     rotation = Rotation.from_rotvec(turn)
     axis = sensor_axis(rotation.as_quat(scalar_first=True))
     np.testing.assert_allclose(axis, rotation.apply([0.0, 0.0, -1.0]), atol=1e-12)
+
+
+@given(turn=VECTORS, limit=st.floats(0.05, 1.2), rays=st.integers(2, 40))
+def test_the_rim_of_a_cone_goes_once_around_at_its_half_angle(turn, limit, rays):
+    axis = Rotation.from_rotvec(turn).apply([0.0, 0.0, -1.0])
+    rim = cone_rim(axis, limit, rays + 1)
+    np.testing.assert_allclose(np.linalg.norm(rim, axis=1), 1.0)
+    np.testing.assert_allclose(rim @ axis, math.cos(limit), atol=1e-12)
+    np.testing.assert_allclose(rim[0], rim[-1], atol=1e-12)
+    chords = np.linalg.norm(np.diff(rim, axis=0), axis=1)
+    np.testing.assert_allclose(chords, 2.0 * math.sin(limit) * math.sin(math.pi / rays), rtol=1e-9)
 
 
 @given(turn=VECTORS, ray=VECTORS, limit=st.floats(0.05, 1.2))

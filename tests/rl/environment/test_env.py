@@ -371,6 +371,25 @@ def test_a_picture_of_measured_looks_shows_the_heights_too():
     assert colourful.mean() > 0.3
 
 
+def test_a_picture_shows_the_body_close_by_and_its_flame_once_it_burns():
+    env = LunarHDAMapEnv("rigid-body", render_mode="rgb_array")
+    env.reset(seed=0)
+    flame = np.array([184, 122, 0])  # of `hda.flight.portrait.shape.PLUME_COLOR`
+    burning = []
+    for steps in (4, 0):
+        picture = env.render()
+        assert picture is not None
+        close = picture[202:280, 248:325].astype(int)  # the corner of the left panel
+        assert (close > 250).all(axis=2).mean() > 0.3  # on white
+        grey = (np.ptp(close, axis=2) < 3) & (close[..., 0] > 30) & (close[..., 0] < 200)
+        assert grey.sum() > 100  # the lander
+        burning.append(int((np.abs(close - flame).sum(axis=2) < 30).sum()))
+        for _ in range(steps):
+            env.step(np.zeros(5, dtype=np.float32))
+    assert burning[0] == 0
+    assert burning[1] > 10
+
+
 def test_picture_of_the_flight():
     env = LunarHDAMapEnv(render_mode="rgb_array")
     env.reset(seed=0)

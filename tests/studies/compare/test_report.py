@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
+from hda.flight.episode import fly
 from hda.flight.episode_row import EpisodeRow
 from hda.task.presets import PRESETS
 from hda.task.scenario import sample_scenario
@@ -23,6 +25,8 @@ from studies.compare.flights import (
     coarse_ground,
     pack_levels,
     picture_ground,
+    picture_lander,
+    reduce_flight,
 )
 from studies.compare.report import script_json
 from studies.compare.scores import score_study
@@ -82,6 +86,32 @@ def test_every_flight_ends_as_its_row_says(study: Path) -> None:
         assert data["time"][-1] == pytest.approx(float(row["flight_time_s"]), abs=0.006)
         assert len(data["looks"]) == int(row["decisions"])
         assert max(data["thrust"]) == pytest.approx(float(row["maximum_thrust_n"]), abs=0.51)
+
+
+def test_a_flight_tells_the_page_how_its_lander_stands_and_the_page_has_the_lander() -> None:
+    study = Study(PRESETS["paper"], ("nearest-safe",), 1)
+    record = fly(study.make_policy("nearest-safe"), sample_scenario("paper", 0, 3))
+    data = reduce_flight(record).data
+    vectors = np.array(data["attitude"])
+    assert vectors.shape == (3, len(data["time"]))
+    turns = Rotation.from_quat(
+        np.vstack([np.sqrt(1.0 - (vectors**2).sum(axis=0)), vectors]).T, scalar_first=True
+    )
+    kept = np.searchsorted(record.time, np.array(data["time"][:-1]) - 0.006)
+    thrust = record.thrust[kept]
+    size = np.linalg.norm(thrust, axis=1, keepdims=True)
+    burns = size[:, 0] > 0.0
+    axes = turns.apply([0.0, 0.0, 1.0])[:-1]
+    np.testing.assert_allclose(axes[burns], (thrust / np.maximum(size, 1e-9))[burns], atol=0.005)
+    lander = picture_lander(study.preset)
+    assert not lander["rigid"]
+    assert picture_lander(PRESETS["rigid-body"])["rigid"]
+    for part in ("body", "plume"):
+        surface = lander[part]
+        assert max(max(corner) for corner in surface["triangles"]) < len(surface["x"])
+        assert len(surface["colors"]) == len(surface["triangles"][0])
+    assert max(surface["x"]) <= max(lander["body"]["x"]) <= 0.5 * lander["size"]
+    assert lander["size"] == lander["enlarged"] * study.preset.criteria.footprint_diameter
 
 
 def test_one_episode_of_one_policy_has_a_report(tmp_path: Path) -> None:

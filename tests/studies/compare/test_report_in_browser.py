@@ -106,6 +106,40 @@ def test_the_episode_browser_switches(browser: Any, study: Path, page_address: s
 
 
 @pytest.mark.browser
+def test_the_lander_moves_with_the_time_and_the_newest_look_comes_with_it(
+    browser: Any, page_address: str
+) -> None:
+    browser.get(page_address)
+    browser.execute_script("document.getElementById('flight-space').scrollIntoView({block: 'center'})")
+    wait_for(browser, "return document.getElementById('flight-space').dataset.shown")
+    traces = "const t = document.getElementById('flight-space').data.slice(-4);"
+    assert (
+        browser.execute_script(f"{traces} return t.map(one => one.type)")
+        == ["mesh3d"] * 2 + ["scatter3d"] * 2
+    )
+    feet = f"{traces} return Math.min(...t[0].z)"
+    flight = (
+        "const p = document.getElementById('policy').value, e = document.getElementById('episode').value;"
+        "return JSON.parse([...document.querySelectorAll('script.flight')]"
+        ".find(n => n.dataset.policy === p && n.dataset.episode === e).textContent)"
+    )
+    data = browser.execute_script(flight)
+    assert browser.execute_script(feet) == pytest.approx(data["z"][0], abs=0.1)  # upright at the start
+    node = len(data["time"]) // 2
+    slide = "const s = document.getElementById('{}'); s.value = {}; s.dispatchEvent(new Event('input'))"
+    browser.execute_script(slide.format("moment", node))
+    wait_for(browser, f"{traces} return Math.abs(Math.min(...t[0].z) - {data['z'][node]}) < 0.1")
+    text = browser.find_element("id", "moment-text").text
+    assert text.startswith(f"{data['time'][node]:g} s: {data['thrust'][node]:g} N")
+    newest = sum(view["time"] <= data["time"][node] + 0.011 for view in data["looks"])
+    assert browser.find_element("id", "look-text").text.startswith(f"{newest} of ")
+    browser.execute_script(slide.format("look", 1))
+    shown = browser.execute_script("return Number(document.getElementById('moment').value)")
+    assert data["time"][shown] == pytest.approx(data["looks"][1]["time"], abs=0.011)
+    assert_no_error(browser)
+
+
+@pytest.mark.browser
 @pytest.mark.parametrize("width", [1280, 390])
 def test_it_fits_a_screen_and_a_phone(browser: Any, page_address: str, width: int) -> None:
     open_at(browser, page_address, width)
