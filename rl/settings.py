@@ -1,12 +1,12 @@
-"""How an agent learns: settings and the recipes of the shipped ones. Nothing of torch is imported here."""
+"""How an agent learns. Nothing of torch is imported here."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from typing import Any, Literal, get_args
 
 from rl.environment.action import ActionRanges
-from rl.environment.encoding import CURVED, PRINTED
+from rl.environment.encoding import CURVED
 from rl.inference.artefacts import ENCODER
 
 AlgorithmName = Literal["td3", "sac", "ddpg", "tqc", "td3-lstm", "td3-lstm-plus", "ppo", "recurrent-ppo"]
@@ -197,78 +197,12 @@ class RecurrentOnPolicySettings(OnPolicySettings):
     memory: int = 128
 
 
-PPO_SETTINGS = OnPolicySettings()
-RECURRENT_PPO_SETTINGS = RecurrentOnPolicySettings()
-TD3_SETTINGS = OffPolicyAgentSettings()
-SAC_SETTINGS = replace(
-    TD3_SETTINGS,
-    algorithm="sac",
-    learning_rate=1e-3,
-    final_learning_rate=1e-4,
-    learning_rate_decay=(30_000, 150_000),
-    discount=0.98,
-    random_steps=5_000,
-)
-
-
-RECURRENT_RECIPES = {
-    "td3-lstm": RecurrentSettings(),
-    "td3-lstm-plus": RecurrentSettings(
-        algorithm="td3-lstm-plus", control_prior_step=110_000, learning_rate_decay=(120_000, 160_000)
-    ),
-}
-
-
-CONVEX_SETTINGS = replace(
-    TD3_SETTINGS,
-    guidance="convex",
-    learning_rate_decay=(90_000, 140_000),
-    control_prior_weight=0.0,
-    random_steps=10_000,
-)
-
-
-OFF_POLICY_RECIPES: dict[str, OffPolicyAgentSettings] = {
-    "td3": TD3_SETTINGS,
-    "sac": SAC_SETTINGS,
-    "ddpg": replace(TD3_SETTINGS, algorithm="ddpg"),
-    "tqc": replace(SAC_SETTINGS, algorithm="tqc"),
-    **RECURRENT_RECIPES,
-    "td3-belief": replace(TD3_SETTINGS, sight="belief"),
-    "td3-convex": CONVEX_SETTINGS,
-    "td3-belief-convex": replace(CONVEX_SETTINGS, sight="belief"),
-    "td3-paper": replace(
-        TD3_SETTINGS,
-        layout=PRINTED.name,
-        final_learning_rate=3e-4,
-        smoothing_noise=0.2,
-        control_prior_weight=0.0,
-    ),
-}
-"""`td3-paper` is the vector that the paper prints with the settings that TD3's authors published, since the
-paper gives none. Settings of the others without "belief" and "convex" were chosen by measurement; those two
-take td3's, under convex guidance for fewer steps, and nothing was tuned for them."""
-
-ON_POLICY_RECIPES: dict[str, OnPolicySettings] = {
-    "ppo": PPO_SETTINGS,
-    "recurrent-ppo": RECURRENT_PPO_SETTINGS,
-    "ppo-thrust": replace(
-        PPO_SETTINGS,
-        guidance="thrust",
-        learning_rate=5e-4,
-        learning_rate_decay=(0, 4_000_000),
-        environments=64,
-        horizon=128,
-        discount=0.998,
-        trace=0.98,
-        log_deviation=-1.5,
-    ),
-}
-
-RECIPES: dict[str, AgentSettings] = {**OFF_POLICY_RECIPES, **ON_POLICY_RECIPES}
-
 _KINDS: dict[str, type[AgentSettings]] = {
-    name: type(recipe) for name, recipe in RECIPES.items() if recipe.algorithm == name
+    **dict.fromkeys(ALGORITHMS, OffPolicyAgentSettings),
+    "td3-lstm": RecurrentSettings,
+    "td3-lstm-plus": RecurrentSettings,
+    "ppo": OnPolicySettings,
+    "recurrent-ppo": RecurrentOnPolicySettings,
 }
 
 

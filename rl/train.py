@@ -20,11 +20,15 @@ from typing import Annotated, Any, Union
 import tyro
 
 from guidance.console import one_line_errors, tolerate_encoding
-from rl.settings import (
+from rl.recipes import (
     OFF_POLICY_RECIPES,
     ON_POLICY_RECIPES,
+    RECIPES,
     RECURRENT_PPO_SETTINGS,
     RECURRENT_RECIPES,
+    STEPS,
+)
+from rl.settings import (
     AgentSettings,
     OffPolicyAgentSettings,
     OnPolicySettings,
@@ -56,7 +60,7 @@ class TrainingOptions:
     seed: int = 0
     out: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
     preset: str = "paper"
-    steps: int = 275_000
+    steps: int = STEPS["td3"]
     resume: bool = False
     validate_every: int = 10_000
     validation_episodes: int = 200
@@ -85,7 +89,7 @@ class TrainRecurrentAgent(TrainingOptions):
     """
 
     settings: tyro.conf.OmitArgPrefixes[RecurrentSettings] = RECURRENT_RECIPES["td3-lstm"]
-    steps: int = 120_000
+    steps: int = STEPS["td3-lstm"]
 
 
 @dataclass(frozen=True)
@@ -99,7 +103,7 @@ class TrainOnPolicyAgent(TrainingOptions):
     """
 
     settings: tyro.conf.OmitArgPrefixes[OnPolicySettings] = ON_POLICY_RECIPES["ppo"]
-    steps: int = 2_000_000
+    steps: int = STEPS["ppo"]
 
 
 @dataclass(frozen=True)
@@ -113,31 +117,30 @@ class TrainRecurrentOnPolicyAgent(TrainingOptions):
     """
 
     settings: tyro.conf.OmitArgPrefixes[RecurrentOnPolicySettings] = RECURRENT_PPO_SETTINGS
-    steps: int = 600_000
+    steps: int = STEPS["recurrent-ppo"]
 
 
-def _named(name: str, kind: type[TrainingOptions], **options: Any) -> Any:
+_OPTIONS: tuple[tuple[type[AgentSettings], type[TrainingOptions]], ...] = (
+    (RecurrentOnPolicySettings, TrainRecurrentOnPolicyAgent),
+    (OnPolicySettings, TrainOnPolicyAgent),
+    (RecurrentSettings, TrainRecurrentAgent),
+    (OffPolicyAgentSettings, TrainAgent),
+)
+"""Options of each kind of settings, the narrowest kind first."""
+
+
+def _named(name: str) -> Any:
     """The command of a recipe."""
-    return Annotated[kind, tyro.conf.subcommand(name, default=kind(**options))]
+    recipe = RECIPES[name]
+    kind = next(options for settings, options in _OPTIONS if isinstance(recipe, settings))
+    default = kind(settings=recipe, steps=STEPS[name])  # type: ignore[arg-type]
+    return Annotated[kind, tyro.conf.subcommand(name, default=default)]
 
 
-_STEPS = {"td3-convex": 150_000, "td3-belief-convex": 150_000}
-_AGENTS = [
-    *(
-        _named(name, TrainAgent, settings=recipe, steps=_STEPS.get(name, TrainAgent.steps))
-        for name, recipe in OFF_POLICY_RECIPES.items()
-        if not isinstance(recipe, RecurrentSettings)
-    ),
-    _named("td3-lstm", TrainRecurrentAgent),
-    _named("td3-lstm-plus", TrainRecurrentAgent, settings=RECURRENT_RECIPES["td3-lstm-plus"], steps=170_000),
-    _named("ppo", TrainOnPolicyAgent),
-    _named("ppo-thrust", TrainOnPolicyAgent, settings=ON_POLICY_RECIPES["ppo-thrust"], steps=4_000_000),
-    _named("recurrent-ppo", TrainRecurrentOnPolicyAgent),
-]
 Command = Union[
     (
         Annotated[TrainAutoencoder, tyro.conf.subcommand("autoencoder")],
-        *_AGENTS,
+        *map(_named, RECIPES),
         Annotated[ExportWeights, tyro.conf.subcommand("export")],
     )
 ]

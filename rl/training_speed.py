@@ -114,7 +114,7 @@ def _filled_with_sequences(name: str, options: TrainingSpeed) -> Any:
     from rl.environment.env import LunarHDAEnv
     from rl.learning.algorithms import make_agent_with_memory
     from rl.learning.recurrent.replay import Episode
-    from rl.settings import RECURRENT_RECIPES
+    from rl.recipes import RECURRENT_RECIPES
 
     recipe = replace(RECURRENT_RECIPES[name], batch_size=options.sequences, memory=options.memory)
     agent = make_agent_with_memory(recipe, LunarHDAEnv(), 0)

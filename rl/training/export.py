@@ -40,7 +40,7 @@ class ExportWeights:
 
 def training_command(card: dict[str, Any], seed: int) -> str:
     """The command that trains a run as its card says: settings that differ from the recipe's become flags."""
-    from rl.settings import RECIPES
+    from rl.recipes import RECIPES
 
     recipe = json.loads(json.dumps(asdict(RECIPES[card["recipe"]])))
     parts = ["python -m rl.train", card["recipe"], f"--seed {seed}", f"--preset {card['preset']}"]

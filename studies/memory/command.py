@@ -32,7 +32,7 @@ from guidance.console import tolerate_encoding
 from guidance.validation import finite_number, unknown_name
 from hda.task.presets import find_preset
 from rl.policies.actor import shipped, weights_name
-from rl.settings import RECIPES
+from rl.recipes import RECIPES
 from rl.training.candidates import Choice
 from studies.campaign.command_line import open_folder, resumable
 from studies.campaign.provenance import describe_run, write_provenance

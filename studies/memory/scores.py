@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from rl.policies.actor import weights_name
-from rl.settings import RECIPES
+from rl.recipes import RECIPES
 from rl.training.candidates import Choice, best_of_run
 from rl.training.run_folder import read_rows, read_run
 from studies.campaign.shards import write_durably

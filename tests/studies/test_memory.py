@@ -16,7 +16,7 @@ from scipy.stats import ttest_ind
 
 from hda.task.presets import PRESETS
 from rl.inference.artefacts import WEIGHTS_FOLDER
-from rl.settings import RECIPES
+from rl.recipes import RECIPES
 from rl.training.candidates import Choice
 from rl.training.run import run_training
 from rl.training.run_folder import TrainingPlan

@@ -30,7 +30,7 @@ from rl.inference.artefacts import Artefact
 from rl.inference.networks import Perceptron
 from rl.policies.actor import actor_from_artefact
 from rl.policies.thrust_actor import ThrustActor
-from rl.settings import RECIPES
+from rl.recipes import RECIPES
 from rl.training.actor_export import actor_card
 from tests.equality import same
 from tests.rl.lanes import Lane

@@ -11,7 +11,7 @@ from rl.environment.env import LunarHDAEnv
 from rl.learning.algorithms import make_agent_with_memory
 from rl.learning.recurrent.losses import SequenceTensors, actor_loss
 from rl.learning.recurrent.replay import Episode
-from rl.settings import RECURRENT_RECIPES
+from rl.recipes import RECURRENT_RECIPES
 
 RECIPE = replace(RECURRENT_RECIPES["td3-lstm-plus"], memory=8, hidden=(16,), batch_size=4, learning_rate=1e-3)
 

@@ -15,7 +15,7 @@ from rl.learning.algorithms import make_algorithm
 from rl.learning.box_spaces import check_environment
 from rl.learning.recurrent.td3_lstm import RecurrentTD3
 from rl.learning.td3 import FastTD3
-from rl.settings import OFF_POLICY_RECIPES
+from rl.recipes import OFF_POLICY_RECIPES
 
 UNIT = spaces.Box(-1.0, 1.0, (2,), np.float32)
 

@@ -8,7 +8,8 @@ from rl.environment.action import CONTROLS
 from rl.environment.env import LunarHDAEnv
 from rl.learning.algorithms import make_algorithm
 from rl.learning.td3 import FastTD3
-from rl.settings import OFF_POLICY_RECIPES, OffPolicyAgentSettings
+from rl.recipes import OFF_POLICY_RECIPES
+from rl.settings import OffPolicyAgentSettings
 
 
 def flat_critic(actor_bias: float) -> FastTD3:

@@ -22,7 +22,7 @@ from rl.learning.recurrent.losses import SequenceTensors, actor_loss, critic_los
 from rl.learning.recurrent.replay import Episode
 from rl.learning.recurrent.td3_lstm import RecurrentTD3
 from rl.policies.recurrent_actor import RecurrentAgentPolicy, load_memory_actor
-from rl.settings import RECURRENT_RECIPES
+from rl.recipes import RECURRENT_RECIPES
 from rl.training.actor_export import actor_card, actor_tensors, policy_of
 from rl.training.run import run_training
 from rl.training.run_folder import TrainingPlan, read_rows

@@ -20,7 +20,7 @@ from rl.environment.env import LunarHDAEnv
 from rl.inference.artefacts import ArtefactError, card_digest, save_artefact
 from rl.policies.actor import AgentPolicy, AgentSite, load_actor
 from rl.policies.catalogue import entries
-from rl.settings import RECIPES
+from rl.recipes import RECIPES
 from rl.training.actor_export import actor_card
 
 SIZES = (44, 256, 256, 5)

@@ -15,7 +15,7 @@ from hda.task.scenario import sample_scenario
 from rl.figures import GainsFigure, TrainingFigure, draw_gains, draw_training, moving_average
 from rl.inference.artefacts import load_artefact
 from rl.policies.actor import AgentPolicy
-from rl.settings import RECIPES
+from rl.recipes import RECIPES
 from rl.training.candidates import Choice, average_tensors, best_of_run
 from rl.training.export import ExportWeights, run_export
 from rl.training.run import run_training

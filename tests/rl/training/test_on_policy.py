@@ -19,8 +19,8 @@ from rl.inference.artefacts import Artefact, ArtefactError, load_artefact, save_
 from rl.learning.algorithms import make_algorithm
 from rl.policies.actor import AgentPolicy
 from rl.policies.recurrent_actor import RecurrentAgentPolicy, memory_actor_from_artefact
-from rl.settings import ON_POLICY_RECIPES, RECIPES, OnPolicySettings, settings_from_json
-from rl.train import _AGENTS
+from rl.recipes import ON_POLICY_RECIPES, RECIPES, STEPS
+from rl.settings import OnPolicySettings, settings_from_json
 from rl.training.actor_export import actor_card, actor_tensors
 from rl.training.candidates import Choice
 from rl.training.export import ExportWeights, run_export
@@ -176,9 +176,8 @@ def test_no_run_goes_on_where_the_learning_rate_is_zero(name, tmp_path):
 
 
 def test_every_recipe_learns_for_all_steps_of_its_command():
-    for command in _AGENTS:
-        options = command.__metadata__[0].default
-        options.settings.refuse_steps(options.steps)
+    for name, recipe in RECIPES.items():
+        recipe.refuse_steps(STEPS[name])
 
 
 def test_thrusts_on_measured_looks_are_refused_with_the_way_out(tmp_path):

@@ -14,7 +14,8 @@ from hda.task.presets import PRESETS
 from hda.task.scenario import sample_scenario
 from rl.environment.native.stepped_vector import SteppedVectorEnv
 from rl.inference.artefacts import load_artefact
-from rl.settings import RECIPES, AgentSettings
+from rl.recipes import RECIPES
+from rl.settings import AgentSettings
 from rl.training.actor_export import policy_of
 from rl.training.run import make_environment, run_training
 from rl.training.run_folder import TrainingPlan

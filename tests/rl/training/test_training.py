@@ -10,7 +10,7 @@ import pytest
 
 from hda.task.presets import PRESETS
 from rl.inference.artefacts import ArtefactError, load_artefact
-from rl.settings import RECIPES
+from rl.recipes import RECIPES
 from rl.training.export import ExportWeights, run_export
 from rl.training.run import run_training
 from rl.training.run_folder import TrainingPlan, read_rows
