@@ -36,8 +36,8 @@ class NavigationState:
 
     Attributes:
         estimate: shape (13,): position [m], velocity [m/s], accelerometer bias [m/s^2], height of the ground
-            under the beam [m], landing site [m]; site frame. With a gyroscope (23,): then seven zeros, of what
-            is not estimated or stands in the attitude, and its bias [rad/s], body frame.
+            under the beam [m], landing site [m]; site frame. With a gyroscope (23,): then seven zeros, of
+            what is not estimated or stands in the attitude, and its bias [rad/s], body frame.
         covariance: shape (20, 20), of the errors of these and of the considered: altimeter bias [m], three
             beam biases [m/s], tilt [rad]. With a gyroscope (23, 23): the tilt is estimated too, and its bias.
         rejections: shape (4,), readings in a row that the gate rejected: altimeter, velocimeter, terrain fix,

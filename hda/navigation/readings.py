@@ -104,8 +104,8 @@ def read_velocimeter(
 ) -> float:
     """Three speeds along the beams, z_i = -u_i . v + bias_i: the squared innovation.
 
-    A beam without a reading leaves a row of zeros, which tells nothing and adds nothing to the square. The
-    gate is that of three beams.
+    A beam without a reading leaves a row of zeros, which tells nothing and adds nothing to the square; NaN
+    where no beam has one. The gate is that of three beams.
 
     Args:
         memory: of the filter; changed in place.
@@ -119,7 +119,7 @@ def read_velocimeter(
     deviation = _deviation(numbers.velocimeter, height)
     design = np.zeros((3, memory.covariance.shape[0]))
     innovation, noise = np.empty(3), np.empty(3)
-    believed = memory.mean[VELOCITY : VELOCITY + 3]
+    believed, read = memory.mean[VELOCITY : VELOCITY + 3], 0
     for i in range(3):
         beam = _believed_beam(numbers.beams[i], errors.tilt, turn)
         pointed = beam + cross(errors.tilt, beam)
@@ -137,6 +137,9 @@ def read_velocimeter(
             design[i, TILT + axis] = -turned[axis]
         design[i, BEAM_BIAS + i] = 1.0
         innovation[i] = reading - predicted
+        read += 1
+    if read == 0:
+        return math.nan
     gating = (numbers.gates[VELOCIMETER], numbers.patience, VELOCIMETER, VELOCITY, VELOCITY + 3)
     return take_in(memory, design, innovation, noise, gating)
 

@@ -36,8 +36,8 @@ class InertialUnit:
         bias: [m/s^2] one sigma of the bias along each axis (300 ug, LN-200S).
         correlation_time: [s] of the bias, a Gauss-Markov process (chosen: many descents long).
         tilt: [rad] one sigma, about each axis, of the error of the attitude at the start (chosen: 1 mrad,
-            what a star tracker's tenth of that becomes in the minutes of braking before). Without a `Gyroscope`
-            it stays as it was drawn for the whole episode.
+            what a star tracker's tenth of that becomes in the minutes of braking before). Without a
+            `Gyroscope` it stays as it was drawn for the whole episode.
 
     Raises:
         ValueError: a field is out of range.
