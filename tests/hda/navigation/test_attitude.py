@@ -43,7 +43,7 @@ SEEDS = st.integers(0, 2**32 - 1)
 def hover(system: NavigationSystem, duration: float, attitude: Array) -> NavigationState:
     """The filter after standing still above no known ground, with a start known but for its attitude."""
     sure = replace(system, horizontal_error=0.0, vertical_error=0.0, velocity_error=0.0)
-    time = 0.1 * np.arange(round(duration / 0.1) + 1)
+    time = 0.1 * np.arange(round(duration / 0.1) + 1, dtype=np.float64)
     state = State(np.array([0.0, 0.0, 500.0]), np.zeros(3), 1200.0)
     start = begin_navigation(sure, state, TARGET, draw_sensor_errors(sure, np.random.default_rng(0)))
     path, periods = np.tile(state.as_array(), (time.size, 1)), time.size - 1
@@ -233,7 +233,7 @@ def test_an_attitude_that_errs_far_more_still_errs_as_it_says(swaying: list[Desc
 def test_a_path_without_attitudes_is_refused_where_there_is_a_gyroscope():
     state = State(np.array([0.0, 0.0, 500.0]), np.zeros(3), 1200.0)
     start = begin_navigation(SYSTEM, state, TARGET, draw_sensor_errors(SYSTEM, np.random.default_rng(0)))
-    time, path = 0.5 * np.arange(3), np.tile(state.as_array(), (3, 1))
+    time, path = 0.5 * np.arange(3, dtype=np.float64), np.tile(state.as_array(), (3, 1))
     draws = draw_readings(np.random.default_rng(0), 2, gyroscope=True)
     with pytest.raises(ValueError, match="must have attitudes"):
         navigate(SYSTEM, start, (time, path, np.ones(2)), draws)

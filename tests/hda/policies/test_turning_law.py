@@ -65,7 +65,7 @@ def test_with_a_sensor_fixed_to_the_body_a_plan_pays_for_its_looks():
     plain, seeing = (TurningLaw().plan(look, look.target, world.view) for world in (scenario, fixed))
     assert plain is not None
     assert seeing is not None
-    options = replace(TurningLaw().options, looks=LooksAhead(5.0, math.radians(5.7), math.inf))
+    options = replace(TurningLaw().options, looks=LooksAhead(5.0, math.radians(5.7), 8.0, price=0.0))
     indifferent = TurningLaw(options).plan(look, look.target, scenario.view)
     assert indifferent is not None
     cost = [float(np.linalg.norm(plan.thrust_acceleration, axis=1).sum()) for plan in (indifferent, seeing)]
