@@ -100,7 +100,7 @@ RESULTS: dict[str, Result] = {
     ),
     "rare-causes": Result("rare-events.md", "studies.rare_events --effort 0.5 --out results/rare_causes"),
     "information-bound": Result("information-bound.md", "studies.information_bound --episodes 100"),
-    "rigid-plans": Result("../explanation/rigid-body.md", "studies.rigid_plans --starts 1000"),
+    "rigid-plans": Result("../explanation/rigid-body-plans.md", "studies.rigid_plans --starts 1000"),
     "scale": Result("scale.md", "studies.scale --episodes 1000 10000"),
 }
 """Name -> what is made, the README's first."""

@@ -7,6 +7,9 @@ whose size is free, as an engine answers sooner than a body turns. Of the flight
 thrusts the cheapest is taken whose thrust keeps its size, its angle from the vertical, and the rate and the
 acceleration with which it turns. A least-propellant descent is cheaper, but switches its thrust, and asks for
 another direction at once at its start and its end.
+
+Where a sensor is fixed to the body (`guidance.tracking.looks_ahead`) each flight is tried with detours too,
+and what its looks miss is added to its cost.
 """
 
 from __future__ import annotations
@@ -23,6 +26,7 @@ from guidance.rigid_body.body import RigidBody
 from guidance.rigid_body.motion import turning_acceleration
 from guidance.rigid_body.quaternion import rotate
 from guidance.rigid_body.state import RigidState
+from guidance.tracking.looks_ahead import LooksAhead, bend_flights, price_missed_looks
 from guidance.tracking.reference import TrackingReference, make_reference
 from guidance.validation import finite_number, finite_vector
 
@@ -47,6 +51,7 @@ class TurningOptions:
         terminal_time: [s] of the constant deceleration, upright.
         terminal_deceleration: [m/s^2] in it.
         longest: [s] of a flight.
+        looks: that a sensor fixed to the body will take of the site; None where it turns to the site itself.
 
     Raises:
         ValueError: a field is out of range.
@@ -59,6 +64,7 @@ class TurningOptions:
     terminal_time: float = 5.0
     terminal_deceleration: float = 0.3
     longest: float = 70.0
+    looks: LooksAhead | None = None
 
     def __post_init__(self) -> None:
         """Refuse what no flight could keep."""
@@ -99,7 +105,7 @@ class _Ends:
 
 def _evaluate(coefficients: Array, share: Array, order: int) -> Array:
     """A derivative by the share of the time: shape (m, ...) for m shares."""
-    powers = np.arange(6)
+    powers = np.arange(coefficients.shape[0])
     factor = np.array([math.perm(p, order) for p in powers], dtype=np.float64)
     basis = factor * share[:, None] ** np.maximum(powers - order, 0)
     return np.tensordot(basis, coefficients, axes=1)
@@ -143,9 +149,12 @@ def plan_turning_descent(
     start = state.position, state.velocity, np.array(_FIRST_THRUSTS)[:, None] * axis + down
     end = gate, -speed * up, options.terminal_deceleration * up
     longest = max(_SHORTEST, int(options.longest / control_period))
-    counts = np.unique(np.round(np.geomspace(_SHORTEST, longest, _DURATIONS)).astype(int))
+    durations = _DURATIONS if options.looks is None else _DURATIONS // 2
+    counts = np.unique(np.round(np.geomspace(_SHORTEST, longest, durations)).astype(int))
     time = counts * control_period
     coefficients = _Ends(start, end, time).coefficients()
+    if options.looks is not None:
+        coefficients = bend_flights(coefficients, state.velocity[:2])
     share = np.linspace(0.0, 1.0, _INSTANTS)
     thrust = _evaluate(coefficients, share, 2) / time[:, None, None] ** 2 - down
     size = np.linalg.norm(thrust, axis=-1)
@@ -156,6 +165,9 @@ def plan_turning_descent(
     payable = body.lander.exhaust_velocity * math.log(max(state.mass / body.lander.dry_mass, 1.0))
     payable -= (options.terminal_deceleration - down[2]) * last * control_period  # from the gate on
     cost = np.where((used <= 1.0) & (cost < payable), cost, np.inf)
+    if options.looks is not None:
+        sight = _evaluate(coefficients, share, 0) - place
+        cost += price_missed_looks(sight, thrust, time, last * control_period, options.looks)
     best = np.unravel_index(int(np.argmin(cost)), cost.shape)
     if not np.isfinite(cost[best]):
         return None
@@ -190,7 +202,7 @@ def _used_share(
 def _sample(
     coefficients: Array, count: int, last: int, control_period: float, gravity: Array, deceleration: float
 ) -> TrackingReference:
-    """One flight to the gate, of coefficients of shape (6, 3), and the way from it to the ground."""
+    """One flight to the gate, of coefficients of shape (6 or 7, 3), and the way from it to the ground."""
     share = np.arange(count + 1) / count
     position = _evaluate(coefficients, share, 0)
     velocity = _evaluate(coefficients, share, 1) / (count * control_period)

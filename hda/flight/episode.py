@@ -98,11 +98,11 @@ def observe(scenario: Scenario, flight: Flight) -> Observation:
     """Take the look of this instant; its noise depends on the episode and the number of the look only."""
     lidar = scenario.preset.lidar
     position = flight.state.position
-    error = estimation.estimation_error(scenario, flight.navigation, flight.state, flight.target)
+    navigation, body = flight.navigation, flight.body
+    error = estimation.estimation_error(scenario, navigation, flight.state, flight.target)
     aim = estimation.look_aim(scenario, flight.target, error)
     estimate, width = estimation.displaced(flight.state, error), lidar.width(position, aim)
     rules = scenario.preset.rules
-    body, tilt = flight.body, estimation.attitude_error(scenario)
     late = flight.index > 0 and flight.time_to_go <= _LATE * rules.decision_interval
     stance, ground = None if late else scenario.preset.stance, None
     if isinstance(lidar, RangingLidar):
@@ -124,10 +124,21 @@ def observe(scenario: Scenario, flight: Flight) -> Observation:
         time_to_go=flight.time_to_go,
         ground=ground,
         stance=stance,
-        covariance=None if flight.navigation is None else flight.navigation.relative_covariance,
-        attitude=None if body is None else believed_attitude(body.attitude, tilt),
-        rates=None if body is None else body.rates,
+        covariance=None if navigation is None else navigation.relative_covariance,
+        **_observe_attitude(scenario, flight),
     )
+
+
+def _observe_attitude(scenario: Scenario, flight: Flight) -> dict[str, Array | None]:
+    """What the lander believes of its attitude; nothing of a point mass."""
+    body, navigation = flight.body, flight.navigation
+    if body is None:
+        return {}
+    return {
+        "attitude": believed_attitude(body.attitude, estimation.attitude_error(navigation)),
+        "rates": body.rates + estimation.rate_error(scenario, navigation, flight.index),
+        "attitude_covariance": None if navigation is None else navigation.attitude_covariance,
+    }
 
 
 def advance(scenario: Scenario, flight: Flight, decision: Decision) -> Step:
@@ -153,7 +164,7 @@ def advance(scenario: Scenario, flight: Flight, decision: Decision) -> Step:
         preset.vehicle,
         Surroundings(np.array(preset.gravity), scenario.footing),
         ControlPeriods(rules.control_period, rules.control_periods, preset.attitude_loop),
-        FlightErrors(thrust_error, error, sensing, estimation.attitude_error(scenario)),
+        FlightErrors(thrust_error, error, sensing),
     )
     state, landed = segment.final_state, segment.status is not FlightStatus.FLYING
     site, following, navigation = decision.site, flight.index + 1, None

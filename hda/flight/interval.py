@@ -24,7 +24,7 @@ from hda.flight.held_thrust import (
     hold_period,
 )
 from hda.flight.rigid.pointing import aim_ahead, aim_along, steer_across
-from hda.flight.rigid.turning import PlainTurning, feel_engine, keep_state, name_turning
+from hda.flight.rigid.turning import PlainTurning, feel_engine, keep_state, name_turning, read_gyro, turn_of
 from hda.navigation.steering import PlainSensing, Sensing, name_sensing, sense
 from hda.safety.touchdown_stance import Footing
 
@@ -95,6 +95,7 @@ def _fly_zem_zev(
         remaining = command.time_to_go - command.time_to_go_rate * period * k
         if remaining <= 0.5 * period:
             commanded[k] = 0.0
+            read_gyro(conditions.turning, sensing, k, period)
             time[k + 1] = time[k] + fall_freely(path[k], conditions, path[k + 1])
             keep_state(conditions.turning, k + 1)
             return k + 2, TOUCHDOWN, limited
@@ -110,12 +111,14 @@ def _fly_zem_zev(
         aim_along(conditions.turning, commanded[k], left)
         if limit_into(commanded[k], vehicle.min_thrust, vehicle.max_thrust, vehicle.pointing_limit):
             limited += 1
+        read_gyro(conditions.turning, sensing, k, period)
         flown, status = hold_period(path[k], commanded[k], conditions, path[k + 1])
         keep_state(conditions.turning, k + 1)
         time[k + 1] = time[k] + flown
         if status != FLYING:
             return k + 2, status, limited
-        sense(sensing, (path[k], path[k + 1], flown, k), gravity, conditions.navigation_error)
+        turn = turn_of(conditions.turning, sensing, k)
+        sense(sensing, (path[k], path[k + 1], flown, k, turn), gravity, conditions.navigation_error)
     return periods + 1, FLYING, limited
 
 
@@ -147,6 +150,7 @@ def _fly_plan(
     for k in range(periods + 1):
         if k >= planned:
             commanded[k] = 0.0
+            read_gyro(conditions.turning, sensing, k, period)
             time[k + 1] = time[k] + fall_freely(path[k], conditions, path[k + 1])
             keep_state(conditions.turning, k + 1)
             return k + 2, TOUCHDOWN, limited
@@ -163,12 +167,14 @@ def _fly_plan(
         aim_ahead(conditions.turning, commanded[k], reference.acceleration, k, period, estimate)
         if limit_into(commanded[k], vehicle.min_thrust, vehicle.max_thrust, vehicle.pointing_limit):
             limited += 1
+        read_gyro(conditions.turning, sensing, k, period)
         flown, status = hold_period(path[k], commanded[k], conditions, path[k + 1])
         keep_state(conditions.turning, k + 1)
         time[k + 1] = time[k] + flown
         if status != FLYING:
             return k + 2, status, limited
-        sense(sensing, (path[k], path[k + 1], flown, k), gravity, navigation)
+        turn = turn_of(conditions.turning, sensing, k)
+        sense(sensing, (path[k], path[k + 1], flown, k, turn), gravity, navigation)
         told = _estimate_error(path[k], path[k + 1], commanded[k], period, gravity, estimate)
         least = _LEAST_TELLING * path[k, 6] * period
         estimate = feel_engine(conditions.turning, estimate, told, least)

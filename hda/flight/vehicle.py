@@ -79,7 +79,7 @@ class FlightErrors:
         sensing: a filter that goes on estimating during the interval, from the given error on; its memory is
             changed. None: the error stays.
         tilt: [rad] shape (3,), true minus believed attitude of a rigid body, a small rotation about the
-            site's axes.
+            site's axes; with a filter it is that of `sensing`, which drifts with a gyroscope.
     """
 
     thrust: float = 0.0
@@ -157,7 +157,8 @@ def fly_over(
     footing = None if ground is None else plain_footing(ground)
     sensing = None if errors.sensing is None else plain_sensing(errors.sensing)
     believed = errors.navigation.copy()
-    turning = _begin_turning(state, vehicle, interval, gravity, errors.tilt, command)
+    tilt = errors.tilt if errors.sensing is None else errors.sensing.errors.tilt
+    turning = _begin_turning(state, vehicle, interval, gravity, tilt, command)
     conditions = (interval.period, plane, gravity, limits, errors.thrust, believed, footing, turning)
     point = state.point if isinstance(state, RigidState) else state
     start, log = point.as_array(), (time, path, commanded)

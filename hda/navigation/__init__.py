@@ -2,7 +2,8 @@
 
 `sensors` and `system` say what is aboard, `sensor_errors` what chance does to it. `navigation_state` is what
 the filter knows, `filter` takes it along a flight, `site_tracking` puts the landing site into it. The other
-modules are their kernels: `layout` names the numbers, `propagation` is the inertial unit, `readings` and
+modules are their kernels: `layout` names the numbers, `propagation` is the inertial unit, `attitude` that of
+a turning body, `readings` and
 `site_fixes` are the other sensors, `schmidt_update` takes a measurement in, `control_period` takes the filter
 over one period or along a path, `steering` calls it in the vehicle's loop. It sees the ground by
 `hda.sensing`; the task and the simulator import it.
@@ -23,7 +24,14 @@ if TYPE_CHECKING:
         draw_readings,
         draw_sensor_errors,
     )
-    from hda.navigation.sensors import Altimeter, InertialUnit, SiteFixes, TerrainFixes, Velocimeter
+    from hda.navigation.sensors import (
+        Altimeter,
+        Gyroscope,
+        InertialUnit,
+        SiteFixes,
+        TerrainFixes,
+        Velocimeter,
+    )
     from hda.navigation.site_tracking import choose_site, find_site, track_site
     from hda.navigation.system import NAVIGATION_FAULTS, NavigationSystem, add_fault
 
@@ -38,7 +46,14 @@ _HOMES = {
         "draw_readings",
         "draw_sensor_errors",
     ),
-    "hda.navigation.sensors": ("Altimeter", "InertialUnit", "SiteFixes", "TerrainFixes", "Velocimeter"),
+    "hda.navigation.sensors": (
+        "Altimeter",
+        "Gyroscope",
+        "InertialUnit",
+        "SiteFixes",
+        "TerrainFixes",
+        "Velocimeter",
+    ),
     "hda.navigation.site_tracking": ("choose_site", "find_site", "track_site"),
     "hda.navigation.system": ("NAVIGATION_FAULTS", "NavigationSystem", "add_fault"),
 }
@@ -47,6 +62,7 @@ __all__ = [
     "NAVIGATION_FAULTS",
     "Altimeter",
     "FixDraws",
+    "Gyroscope",
     "InertialUnit",
     "NavigationLog",
     "NavigationState",

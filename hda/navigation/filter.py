@@ -1,12 +1,13 @@
 """The lander's navigation filter along a flight: one value in, the next one out.
 
 A dual-state filter, of the vehicle and of the landing site together (Crain and Bishop, NTRS 20170009198), in
-three dimensions of translation. `hda.navigation.layout` says what it estimates and what it only considers.
+three dimensions of translation; with a gyroscope of the attitude too. `hda.navigation.layout` says what it
+estimates and what it only considers.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,8 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from guidance.arrays import Array
 from guidance.constants import MOON_GRAVITY
 from guidance.validation import finite_vector
-from hda.navigation.control_period import navigate_path, range_down
-from hda.navigation.layout import ESTIMATED, SIZE
+from hda.navigation.control_period import TurningPath, navigate_path, range_down
 from hda.navigation.navigation_state import NavigationState
 from hda.navigation.sensor_errors import ReadingDraws, SensorErrors
 from hda.navigation.system import NavigationSystem
@@ -26,15 +26,17 @@ class NavigationLog:
     """The filter after each of n control periods.
 
     Attributes:
-        estimate: shape (n, 13).
-        covariance: shape (n, 20, 20).
+        estimate: shape (n, 13); with a gyroscope (n, 23).
+        covariance: shape (n, 20, 20); with a gyroscope (n, 23, 23).
         innovation_square: shape (n, 3), of altimeter (1 degree of freedom), velocimeter (3) and terrain fix
             (3), in units of its predicted covariance; NaN where there was no reading.
+        tilt: [rad] shape (n, 3), true minus believed attitude, about the site's axes.
     """
 
     estimate: Array
     covariance: Array
     innovation_square: Array
+    tilt: Array
 
 
 def measure_ranges(elevation: NDArray[np.float32], path: Array, errors: SensorErrors) -> Array:
@@ -55,7 +57,7 @@ def measure_ranges(elevation: NDArray[np.float32], path: Array, errors: SensorEr
 def navigate(
     system: NavigationSystem,
     navigation: NavigationState,
-    flown: tuple[Array, Array, Array],
+    flown: tuple[Array, Array, Array] | tuple[Array, Array, Array, Array],
     draws: ReadingDraws,
     gravity: ArrayLike = MOON_GRAVITY,
     control_period: float | None = None,
@@ -68,6 +70,7 @@ def navigate(
         flown: times of n control instants [s] shape (n,), true states there (x y z vx vy vz m) shape (n, 7),
             and ranges down [m] at the nodes after the first, shape (n - 1,), NaN where there is no ground.
             Instants are one control period apart; the last may come at another time, where the flight ends.
+            With a gyroscope also the true attitudes there, unit quaternions, shape (n, 4).
         draws: for at least n - 1 periods.
         gravity: [m/s^2] shape (3,).
         control_period: [s]; the path's first interval if left out.
@@ -77,30 +80,50 @@ def navigate(
 
     Raises:
         ValueError: the shapes do not fit one another, there are too few draws, the intervals but the last are
-            not the control period, or a sensor is not read at a whole number of periods.
+            not the control period, a sensor is not read at a whole number of periods, or attitudes are
+            lacking where there is a gyroscope.
     """
-    time, path, heights = flown
+    time, path, heights = flown[:3]
     periods = time.size - 1
     if periods < 1 or path.shape != (periods + 1, 7) or heights.shape != (periods,):
         raise ValueError(f"flown: shapes {time.shape}, {path.shape} and {heights.shape} do not fit together")
+    if any(attitude.shape != (periods + 1, 4) for attitude in flown[3:]):
+        raise ValueError(f"flown: attitudes must have shape {(periods + 1, 4)}, got {flown[-1].shape}")
     if draws.normal.shape[0] < periods:
         raise ValueError(f"draws must be for {periods} periods, got {draws.normal.shape[0]}")
     period = float(time[1] - time[0]) if control_period is None else control_period
     if np.abs(np.diff(time)[:-1] - period).max(initial=0.0) > 1e-6 * period:
         raise ValueError(f"flown: all intervals but the last must be of one control period, {period:g} s")
-    memory, before = navigation.memory(), navigation.errors
-    errors = before.true_errors()
+    memory, errors = navigation.memory(), navigation.errors.true_errors()
+    size = memory.mean.size, *memory.covariance.shape
     log = NavigationLog(
-        np.empty((periods, ESTIMATED)), np.empty((periods, SIZE, SIZE)), np.empty((periods, 3))
+        np.empty((periods, size[0])),
+        np.empty((periods, *size[1:])),
+        np.empty((periods, 3)),
+        np.empty((periods, 3)),
     )
+    turning = _turning_path(system, flown[3:], draws, period)
     navigate_path(
         memory,
-        (time, path, heights, navigation.instant),
+        (time, path, heights, navigation.instant, turning),
         finite_vector("gravity", gravity, 3),
         errors,
         (draws.normal, draws.uniform),
         system.numbers(period),
-        (log.estimate, log.covariance, log.innovation_square),
+        (log.estimate, log.covariance, log.innovation_square, log.tilt),
     )
-    after = replace(before, accelerometer_bias=errors.accelerometer_bias)
+    after = navigation.errors.moved_on(errors)
     return NavigationState(*memory, after, navigation.instant + periods), log
+
+
+def _turning_path(
+    system: NavigationSystem, attitudes: tuple[Array, ...], draws: ReadingDraws, period: float
+) -> TurningPath | None:
+    """How the body turned along a path; None without a gyroscope."""
+    if system.gyroscope is None:
+        return None
+    if not attitudes or draws.gyro is None:
+        raise ValueError(
+            "flown must have attitudes, and draws must be for a gyroscope, as the system has one"
+        )
+    return TurningPath(attitudes[0], draws.gyro, system.gyroscope.numbers, period)

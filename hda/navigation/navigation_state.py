@@ -16,11 +16,13 @@ from hda.navigation.layout import (
     BEAM_BIAS,
     ESTIMATED,
     GROUND,
+    GYRO_BIAS,
     POSITION,
     SENSORS,
     SITE,
     SIZE,
     TILT,
+    TURNING_SIZE,
     VELOCITY,
     FilterMemory,
 )
@@ -34,9 +36,10 @@ class NavigationState:
 
     Attributes:
         estimate: shape (13,): position [m], velocity [m/s], accelerometer bias [m/s^2], height of the ground
-            under the beam [m], landing site [m]; site frame.
+            under the beam [m], landing site [m]; site frame. With a gyroscope (23,): then seven zeros, of
+            what is not estimated or stands in the attitude, and its bias [rad/s], body frame.
         covariance: shape (20, 20), of the errors of these and of the considered: altimeter bias [m], three
-            beam biases [m/s], tilt [rad].
+            beam biases [m/s], tilt [rad]. With a gyroscope (23, 23): the tilt is estimated too, and its bias.
         rejections: shape (4,), readings in a row that the gate rejected: altimeter, velocimeter, terrain fix,
             site fix.
         errors: the sensors' true errors; for the simulator alone.
@@ -86,10 +89,15 @@ class NavigationState:
     @property
     def relative_covariance(self) -> Array:
         """Shape (6, 6), of position less site [m] and of velocity [m/s]: what a landing on the site needs."""
-        pick = np.zeros((6, SIZE))
+        pick = np.zeros((6, len(self.covariance)))
         pick[:, POSITION : VELOCITY + 3] = np.eye(6)
         pick[:3, SITE : SITE + 3] = -np.eye(3)
         return pick @ self.covariance @ pick.T
+
+    @property
+    def attitude_covariance(self) -> Array:
+        """[rad^2] shape (3, 3), of the small angle about the site's axes by which the attitude errs."""
+        return self.covariance[TILT : TILT + 3, TILT : TILT + 3]
 
 
 def begin_navigation(
@@ -108,12 +116,13 @@ def begin_navigation(
         ValueError: the target is not three finite numbers.
     """
     site = finite_vector("target", target, 3)
-    estimate = np.zeros(ESTIMATED)
+    gyroscope = system.gyroscope
+    estimate = np.zeros(ESTIMATED if gyroscope is None else TURNING_SIZE)
     estimate[POSITION : POSITION + 3] = state.position + errors.position
     estimate[VELOCITY : VELOCITY + 3] = state.velocity + errors.velocity
     estimate[GROUND] = site[2]
     estimate[SITE : SITE + 3] = site
-    sigma = np.zeros(SIZE)
+    sigma = np.zeros(SIZE if gyroscope is None else TURNING_SIZE)
     sigma[POSITION : POSITION + 2] = system.horizontal_error
     sigma[POSITION + 2] = system.vertical_error
     sigma[VELOCITY : VELOCITY + 3] = system.velocity_error
@@ -122,4 +131,5 @@ def begin_navigation(
     sigma[ALTIMETER_BIAS] = 0.0 if system.altimeter is None else system.altimeter.bias
     sigma[BEAM_BIAS : BEAM_BIAS + 3] = 0.0 if system.velocimeter is None else system.velocimeter.bias
     sigma[TILT : TILT + 3] = system.inertial.tilt
+    sigma[GYRO_BIAS:] = 0.0 if gyroscope is None else gyroscope.bias
     return NavigationState(estimate, np.diag(sigma**2), np.zeros(SENSORS, dtype=np.int64), errors)

@@ -22,7 +22,6 @@ from hda.navigation.layout import (
     IMU_POSITION,
     IMU_VELOCITY,
     POSITION,
-    SIZE,
     TILT,
     VELOCITY,
     FilterMemory,
@@ -137,6 +136,6 @@ def carry(
         covariance[b, b] += inertial.bias**2 * (1.0 - kept * kept)
     flown = math.hypot(mean[POSITION] - start_x, mean[POSITION + 1] - start_y)
     covariance[GROUND, GROUND] += -2.0 * numbers.relief**2 * math.expm1(-flown / numbers.relief_length)
-    for i in range(SIZE):
+    for i in range(covariance.shape[0]):
         for j in range(i):
             covariance[j, i] = covariance[i, j]

@@ -15,7 +15,7 @@ import numpy as np
 
 from guidance.arrays import Array
 from guidance.kernel import compile_kernel
-from hda.navigation.layout import ESTIMATED, SIZE, FilterMemory
+from hda.navigation.layout import ALTIMETER_BIAS, ESTIMATED, TILT, FilterMemory
 
 _MOST_DOUBTS = 32  # a factor of 2^32: a state that no such doubt opens is not seen at all
 
@@ -57,7 +57,7 @@ def _design_times(design: Array, table: Array) -> Array:
     """H T by plain loops, equal to the byte on every machine; most of H is 0 and left out."""
     out = np.zeros((design.shape[0], table.shape[1]))
     for a in range(design.shape[0]):
-        for k in range(SIZE):
+        for k in range(design.shape[1]):
             weight = design[a, k]
             if weight != 0.0:
                 for j in range(table.shape[1]):
@@ -70,27 +70,28 @@ def _joseph(covariance: Array, design: Array, across: Array, gain: Array, noise:
     """Joseph's form in place: first A P, then (A P) A' + K R K', with A = I - K H and rank-one steps.
 
     Args:
-        covariance: shape (20, 20), P.
-        design: shape (m, 20), H.
-        across: shape (m, 20), H P.
-        gain: shape (m, 13), K' without what is considered.
+        covariance: shape (n, n), P.
+        design: shape (m, n), H.
+        across: shape (m, n), H P.
+        gain: shape (m, k), K' as far as there are estimates; of what is considered it is 0.
         noise: shape (m,), diagonal of R.
     """
-    rows = design.shape[0]
-    for i in range(ESTIMATED):
+    rows, size = design.shape
+    estimated = gain.shape[1]
+    for i in range(estimated):
         for a in range(rows):
-            for j in range(SIZE):
+            for j in range(size):
                 covariance[i, j] -= gain[a, i] * across[a, j]
     half = _design_times(design, covariance.T)
-    for i in range(SIZE):
+    for i in range(size):
         for a in range(rows):
-            for j in range(ESTIMATED):
+            for j in range(estimated):
                 covariance[i, j] -= half[a, i] * gain[a, j]
-            if i < ESTIMATED:
+            if i < estimated:
                 weight = gain[a, i] * noise[a]
-                for j in range(ESTIMATED):
+                for j in range(estimated):
                     covariance[i, j] += weight * gain[a, j]
-    for i in range(SIZE):
+    for i in range(size):
         for j in range(i):
             mean = 0.5 * (covariance[i, j] + covariance[j, i])
             covariance[i, j] = mean
@@ -103,7 +104,7 @@ def update(memory: FilterMemory, design: Array, innovation: Array, noise: Array,
 
     Args:
         memory: of the filter; changed in place.
-        design: shape (m, 20), derivative of the measurement by the state.
+        design: shape (m, n), derivative of the measurement by the state.
         innovation: shape (m,), measured minus predicted.
         noise: shape (m,), variance of each number's own error.
         gate: greatest squared innovation that is taken in.
@@ -128,10 +129,12 @@ def update(memory: FilterMemory, design: Array, innovation: Array, noise: Array,
         square += whitened[a] * whitened[a]
     if not square <= gate:
         return square
-    gain = across[:, :ESTIMATED].copy()
+    gain = across[:, : mean.size].copy()
+    if mean.size > ESTIMATED:
+        gain[:, ALTIMETER_BIAS:TILT] = 0.0
     _solve_rows(factor, gain)
     for a in range(rows):
-        for i in range(ESTIMATED):
+        for i in range(mean.size):
             mean[i] += gain[a, i] * innovation[a]
     _joseph(covariance, design, across, gain, noise)
     return square
@@ -153,7 +156,7 @@ def take_in(
 
     Args:
         memory: of the filter; changed in place.
-        design: shape (m, 20).
+        design: shape (m, n).
         innovation: shape (m,).
         noise: shape (m,).
         gating: the gate, the patience, the sensor's number, and first and last but one index of the states

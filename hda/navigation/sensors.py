@@ -15,7 +15,7 @@ import numpy as np
 from guidance.arrays import Array
 from guidance.constants import STANDARD_GRAVITY
 from guidance.validation import finite_number
-from hda.navigation.layout import AidingNumbers, InertialNumbers
+from hda.navigation.layout import AidingNumbers, GyroNumbers, InertialNumbers
 
 
 def _check_sensor(sensor: Altimeter | Velocimeter | TerrainFixes) -> None:
@@ -35,8 +35,9 @@ class InertialUnit:
         noise: [m/s^2/sqrt(Hz)] density of the white noise of the specific force (35 ug/sqrt(Hz), LN-200S).
         bias: [m/s^2] one sigma of the bias along each axis (300 ug, LN-200S).
         correlation_time: [s] of the bias, a Gauss-Markov process (chosen: many descents long).
-        tilt: [rad] one sigma, about each axis, of the error of the attitude, one draw for the episode
-            (chosen: 1 mrad, an inertial unit's after a descent; there is no rigid body that could move it).
+        tilt: [rad] one sigma, about each axis, of the error of the attitude at the start (chosen: 1 mrad,
+            what a star tracker's tenth of that becomes in the minutes of braking before). Without a
+            `Gyroscope` it stays as it was drawn for the whole episode.
 
     Raises:
         ValueError: a field is out of range.
@@ -61,8 +62,37 @@ class InertialUnit:
 
 
 @dataclass(frozen=True)
+class Gyroscope:
+    """A triad of gyroscopes, by which a body that turns knows its attitude; by default that of the LN-200S.
+
+    Attributes:
+        noise: [rad/sqrt(s)] angle random walk (0.07 deg/sqrt(h), LN-200S).
+        bias: [rad/s] one sigma of the bias about each axis (1 deg/h, LN-200S).
+        correlation_time: [s] of the bias, a Gauss-Markov process (chosen: many descents long).
+
+    Raises:
+        ValueError: a field is out of range.
+    """
+
+    noise: float = math.radians(0.07) / 60.0
+    bias: float = math.radians(1.0) / 3600.0
+    correlation_time: float = 1000.0
+
+    def __post_init__(self) -> None:
+        """Refuse a gyroscope that cannot exist."""
+        finite_number("noise", self.noise, at_least=0.0)
+        finite_number("bias", self.bias, at_least=0.0)
+        finite_number("correlation_time", self.correlation_time, above=0.0)
+
+    @property
+    def numbers(self) -> GyroNumbers:
+        """The gyroscope for the kernels."""
+        return GyroNumbers(self.noise**2, self.bias, self.correlation_time)
+
+
+@dataclass(frozen=True)
 class Altimeter:
-    """A laser's range straight down, by default as good as ALHAT's.
+    """A laser's range straight down, by default as good as ALHAT's; on a body that turns it hangs on gimbals.
 
     Attributes:
         noise: [m] one sigma of a reading (5 cm, Roback et al., 2015, NTRS 20160005928).
@@ -99,6 +129,9 @@ class Altimeter:
 class Velocimeter:
     """A Doppler LIDAR of three beams, equally spaced about the vertical; by default NASA's of 2020.
 
+    With a `Gyroscope` aboard the beams are fixed to the body and turn with it. A beam then gives no reading
+    where it is less steep than `slant_limit` allows, or the ground along it farther than `ceiling`.
+
     Attributes:
         noise: [m/s] one sigma of the speed along a beam (2 cm/s, NTRS 20200002534).
         bias: [m/s] one sigma of each beam's error common to an episode (chosen).
@@ -109,6 +142,8 @@ class Velocimeter:
         dropout: probability that a reading of all three falls out.
         plume_height: [m] under this height the plume adds to the noise; the filter knows it.
         plume_noise: [m/s] one sigma of what it adds.
+        slant_limit: [rad] greatest angle between the vertical and a beam of a turning body (chosen: 60 deg;
+            the echo weakens with the cosine of it, and the range grows).
 
     Raises:
         ValueError: a field is out of range.
@@ -123,10 +158,12 @@ class Velocimeter:
     dropout: float = 0.0
     plume_height: float = 0.0
     plume_noise: float = 0.0
+    slant_limit: float = math.radians(60.0)
 
     def __post_init__(self) -> None:
         """Refuse a sensor that cannot exist."""
         _check_sensor(self)
+        finite_number("slant_limit", self.slant_limit, above=0.0, at_most=math.radians(89.0))
         finite_number("beam_angle", self.beam_angle, at_least=math.radians(1.0), at_most=math.radians(89.0))
         for name in ("bias", "plume_height", "plume_noise"):
             finite_number(name, getattr(self, name), at_least=0.0)

@@ -11,7 +11,7 @@ import numpy as np
 
 from guidance.arrays import Array
 from guidance.kernel import compile_kernel
-from hda.navigation.layout import POSITION, SITE, SITE_FIX, SIZE, TILT, FilterMemory, cross_matrix
+from hda.navigation.layout import POSITION, SITE, SITE_FIX, TILT, FilterMemory, cross_matrix
 from hda.navigation.propagation import cross
 from hda.navigation.schmidt_update import take_in
 
@@ -33,7 +33,7 @@ def fix_site(memory: FilterMemory, reading: Array, deviation: float, gate: float
         gate: greatest squared innovation that is taken in.
         patience: rejections in a row before the site is doubted.
     """
-    design, innovation, noise = np.zeros((3, SIZE)), np.empty(3), np.empty(3)
+    design, innovation, noise = np.zeros((3, memory.covariance.shape[0])), np.empty(3), np.empty(3)
     predicted = memory.mean[SITE : SITE + 3] - memory.mean[POSITION : POSITION + 3]
     turned = cross_matrix(predicted)
     for axis in range(3):
@@ -53,9 +53,10 @@ def acquire_site(memory: FilterMemory, reading: Array, deviation: float) -> None
     """
     mean, covariance, rejections = memory
     turned = cross_matrix(reading)
-    rows = np.empty((3, SIZE))
+    size = covariance.shape[0]
+    rows = np.empty((3, size))
     for i in range(3):
-        for j in range(SIZE):
+        for j in range(size):
             rows[i, j] = covariance[POSITION + i, j]
             for k in range(3):
                 rows[i, j] -= turned[i, k] * covariance[TILT + k, j]
@@ -66,7 +67,7 @@ def acquire_site(memory: FilterMemory, reading: Array, deviation: float) -> None
                 block[i, j] -= rows[i, TILT + k] * turned[j, k]
     for i in range(3):
         mean[SITE + i] = mean[POSITION + i] + reading[i]
-        for j in range(SIZE):
+        for j in range(size):
             covariance[SITE + i, j] = rows[i, j]
             covariance[j, SITE + i] = rows[i, j]
     for i in range(3):

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from guidance.arrays import Array
 from guidance.validation import finite_vector
+from hda.navigation.attitude import correct_attitude
 from hda.navigation.layout import SITE, SITE_FIX, FilterMemory
 from hda.navigation.navigation_state import NavigationState
 from hda.navigation.sensor_errors import FixDraws
@@ -59,7 +62,10 @@ def track_site(
     reading = measure_site(site - position, navigation.errors.tilt.copy(), deviation, draws.normal)
     memory, gate = navigation.memory(), float(system.gates[SITE_FIX])
     square = fix_site(memory, reading, deviation, gate, system.patience)
-    return _close(navigation, memory), float(square)
+    tilt = navigation.errors.tilt.copy()
+    correct_attitude(memory, tilt)
+    corrected = replace(navigation, errors=replace(navigation.errors, tilt=tilt))
+    return _close(corrected, memory), float(square)
 
 
 def choose_site(navigation: NavigationState, offset: ArrayLike) -> NavigationState:

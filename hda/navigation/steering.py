@@ -17,9 +17,23 @@ from hda.navigation.layout import (
     AidingNumbers,
     FilterMemory,
     FilterNumbers,
+    GyroNumbers,
     InertialNumbers,
     TrueErrors,
+    Turn,
 )
+
+
+class GyroSensing(NamedTuple):
+    """A gyroscope at work over one interval.
+
+    Attributes:
+        draws: shape (n + 1, 6), standard normal: of the interval's control periods, and of the fall after.
+        numbers: the gyroscope.
+    """
+
+    draws: Array
+    numbers: GyroNumbers
 
 
 class Sensing(NamedTuple):
@@ -35,6 +49,7 @@ class Sensing(NamedTuple):
         top: [m] no ground is higher.
         site: [m] shape (3,), the landing site in the frame that the vehicle steers in.
         instant: number of the control instant at which the interval begins.
+        gyro: of a rigid body; None: the attitude errs by one constant tilt.
     """
 
     memory: FilterMemory
@@ -46,6 +61,7 @@ class Sensing(NamedTuple):
     top: float
     site: Array
     instant: int
+    gyro: GyroSensing | None = None
 
 
 _PlainAiding = tuple[float, int, float, float, float, float, float]
@@ -57,12 +73,13 @@ _PlainNumbers = tuple[
     Array,
     float,
     float,
+    float,
     Array,
     int,
 ]
 PlainSensing = tuple[
     tuple[Array, Array, Index],
-    tuple[Array, float, Array, Array],
+    tuple[Array, float, Array, Array, Array],
     Array,
     Array,
     _PlainNumbers,
@@ -70,8 +87,16 @@ PlainSensing = tuple[
     float,
     Array,
     int,
+    tuple[Array, tuple[float, float, float]] | None,
 ]
 """`Sensing` without names: numba takes plain tuples from Python several times as fast."""
+
+
+@compile_kernel
+def _name_gyro(plain: tuple[Array, tuple[float, float, float]] | None) -> GyroSensing | None:
+    if plain is None:
+        return None
+    return GyroSensing(plain[0], GyroNumbers(*plain[1]))
 
 
 @compile_kernel
@@ -79,21 +104,31 @@ def name_sensing(plain: PlainSensing | None) -> Sensing | None:
     """Give a plain tuple its names."""
     if plain is None:
         return None
-    memory, errors, normal, uniform, numbers, elevation, top, site, instant = plain
-    inertial, altimeter, velocimeter, terrain, beams, relief, length, gates, patience = numbers
+    memory, errors, normal, uniform, numbers, elevation, top, site, instant, gyro = plain
+    inertial, altimeter, velocimeter, terrain, beams, steepness, relief, length, gates, patience = numbers
     named = FilterNumbers(
         InertialNumbers(*inertial),
         AidingNumbers(*altimeter),
         AidingNumbers(*velocimeter),
         AidingNumbers(*terrain),
         beams,
+        steepness,
         relief,
         length,
         gates,
         patience,
     )
     return Sensing(
-        FilterMemory(*memory), TrueErrors(*errors), normal, uniform, named, elevation, top, site, instant
+        FilterMemory(*memory),
+        TrueErrors(*errors),
+        normal,
+        uniform,
+        named,
+        elevation,
+        top,
+        site,
+        instant,
+        _name_gyro(gyro),
     )
 
 
@@ -101,12 +136,16 @@ def plain_sensing(sensing: Sensing) -> PlainSensing:
     """Take the names away."""
     numbers = sensing.numbers
     plain = tuple(tuple(part) if isinstance(part, tuple) else part for part in numbers)
-    return (tuple(sensing.memory), tuple(sensing.errors), *sensing[2:4], plain, *sensing[5:])  # pyright: ignore[reportReturnType]
+    gyro = None if sensing.gyro is None else (sensing.gyro.draws, tuple(sensing.gyro.numbers))
+    return (tuple(sensing.memory), tuple(sensing.errors), *sensing[2:4], plain, *sensing[5:9], gyro)  # pyright: ignore[reportReturnType]
 
 
 @compile_kernel
 def sense(
-    sensing: Sensing | None, flown: tuple[Array, Array, float, int], gravity: Array, estimation_error: Array
+    sensing: Sensing | None,
+    flown: tuple[Array, Array, float, int, Turn | None],
+    gravity: Array,
+    estimation_error: Array,
 ) -> None:
     """Take the filter over one flown control period, if there is a filter.
 
@@ -116,16 +155,16 @@ def sense(
     Args:
         sensing: the filter; changed in place. None: the error of the estimate stays as it is, and numba
             compiles nothing of the filter.
-        flown: true states (x y z vx vy vz m) before and after, the time between [s], and the number of the
-            period in its interval.
+        flown: true states (x y z vx vy vz m) before and after, the time between [s], the number of the
+            period in its interval, and how a body with a gyroscope turned in it.
         gravity: [m/s^2] shape (3,).
         estimation_error: shape (6,), estimated minus true position [m] and velocity [m/s]; written in place.
     """
     if sensing is None:
         return
-    before, after, time, period = flown
+    before, after, time, period, turn = flown
     height = range_down(sensing.elevation, after[:3], sensing.errors.tilt, sensing.top)
-    truth = (before, after, time, height, sensing.instant + period + 1)
+    truth = (before, after, time, height, sensing.instant + period + 1, turn)
     draws = (sensing.normal[period], sensing.uniform[period])
     squares = np.empty(3)
     navigate_period(sensing.memory, truth, gravity, sensing.errors, draws, sensing.numbers, squares)

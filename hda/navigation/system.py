@@ -5,6 +5,7 @@ One frozen value, and the named faults that make another of it.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -17,6 +18,7 @@ from guidance.validation import finite_number, unknown_name
 from hda.navigation.layout import FilterNumbers
 from hda.navigation.sensors import (
     Altimeter,
+    Gyroscope,
     InertialUnit,
     SiteFixes,
     TerrainFixes,
@@ -38,6 +40,8 @@ class NavigationSystem:
         velocimeter: or None.
         terrain: fixes against the map from orbit, or None.
         site: fixes of the landing site, or None; without them the site is measured once.
+        gyroscope: of a rigid body: the filter estimates its attitude, and the velocimeter's beams turn with
+            it. None: the attitude errs by one constant tilt.
         horizontal_error: [m] one sigma of the initial position, east and north.
         vertical_error: [m] one sigma of the initial position, up.
         velocity_error: [m/s] one sigma of the initial velocity along each axis.
@@ -67,6 +71,7 @@ class NavigationSystem:
     relief_length: float = 80.0
     false_rejections: float = 1e-3
     patience: int = 3
+    gyroscope: Gyroscope | None = None
 
     def __post_init__(self) -> None:
         """Refuse a system that cannot exist."""
@@ -97,6 +102,7 @@ class NavigationSystem:
             velocimeter=aiding_numbers(self.velocimeter, period),
             terrain=aiding_numbers(self.terrain, period),
             beams=(self.velocimeter or _NO_VELOCIMETER).beams,
+            steepness=math.cos((self.velocimeter or _NO_VELOCIMETER).slant_limit),
             relief=self.relief,
             relief_length=self.relief_length,
             gates=self.gates,

@@ -39,6 +39,7 @@ from hda.policies.cell_prices import (
 )
 from hda.policies.landing_dispersion import dispersion_weights
 from hda.policies.summed_area import SummedArea
+from hda.sensing.sensor_axis import is_fixed
 from hda.task.observation import Observation, ScenarioView
 
 LATTICE = 8
@@ -81,9 +82,15 @@ class HazardAwareWeights:
 def predict_next_look(
     observation: Observation, view: ScenarioView, corner: tuple[int, int], commit_time: float
 ) -> NextLook:
-    """Coast for one decision interval."""
+    """Coast for one decision interval; a sensor fixed to a body sees ground about its easiest landing.
+
+    Steadily braked, the lander stops v t / 2 from where it is. Such a flight leans little, its axis points
+    to about there all the way. To land elsewhere it leans, and its sensor looks elsewhere.
+    """
     interval, state = view.decision_interval, observation.state
     position = state.position + interval * (state.velocity + 0.5 * interval * view.gravity)
+    if view.body is not None and is_fixed(view.lidar):
+        position[:2] = state.position[:2] + 0.5 * observation.time_to_go * state.velocity[:2]
     height = float(position[2] - observation.target[2])
     return NextLook(
         east=float(position[0]) - corner[0],

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 import numpy as np
@@ -12,10 +12,12 @@ from guidance.arrays import Array
 from guidance.rigid_body.body import DEFAULT_BODY, RigidBody
 from guidance.rigid_body.motion import turning_acceleration
 from guidance.rigid_body.state import RigidState
+from guidance.tracking.looks_ahead import LooksAhead
 from guidance.tracking.reference import TrackingReference
 from guidance.tracking.regulator import TrackingWeights, tracking_gains
 from guidance.tracking.turning_descent import DEFAULT_TURNING, TurningOptions, plan_turning_descent
 from hda.policy import PlanCommand
+from hda.sensing.sensor_axis import is_fixed
 from hda.task.observation import Observation, ScenarioView
 
 _REVERSAL = math.radians(6.0)  # of lean, one way and the other, by which a late divert is flown
@@ -26,7 +28,7 @@ class TurningLaw:
     """Plans and feedback for a rigid body.
 
     Attributes:
-        options: how descents are planned.
+        options: how descents are planned; a sensor that is fixed to the body adds its looks.
         upward: weights of the feedback along the vertical, which the throttle answers.
         across: weights across it, which the body answers some seconds later.
         lead: [s] by which the body points ahead of its plan: about what its turn takes.
@@ -46,7 +48,11 @@ class TurningLaw:
             return None
         seen = observation.state
         state = RigidState(seen.position, seen.velocity, seen.mass, observation.attitude)
-        return plan_turning_descent(state, site, view.body, view.control_period, self.options, view.gravity)
+        options = self.options
+        if is_fixed(view.lidar):
+            half_angle, least = view.lidar.off_nadir_limit, reversal_time(view.body)
+            options = replace(options, looks=LooksAhead(view.decision_interval, half_angle, least))
+        return plan_turning_descent(state, site, view.body, view.control_period, options, view.gravity)
 
     def command(self, reference: TrackingReference, period: float) -> PlanCommand:
         """Track a descent with control periods of `period` [s]."""

@@ -6,11 +6,17 @@ the body it sees what lies within half its field of view. Both are one cone.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from guidance.arrays import Array
 from guidance.kernel import compile_kernel
 from guidance.rigid_body.quaternion import rotate
+
+if TYPE_CHECKING:
+    from hda.sensing.lidar import Lidar
+    from hda.sensing.ranging import RangingLidar
 
 
 def sensor_axis(attitude: Array) -> Array:
@@ -34,6 +40,11 @@ def cone_rim(axis: Array, limit: float, rays: int) -> Array:
     across /= np.linalg.norm(across)
     around = np.outer(np.cos(turns), across) + np.outer(np.sin(turns), np.cross(axis, across))
     return np.cos(limit) * axis + np.sin(limit) * around
+
+
+def is_fixed(sensor: Lidar | RangingLidar) -> bool:
+    """Whether a sensor has no gimbals: it looks no further aside than its own field of view reaches."""
+    return sensor.off_nadir_limit <= 0.5 * sensor.field_of_view * (1.0 + 1e-9)
 
 
 @compile_kernel

@@ -7,15 +7,14 @@ for the whole episode; it is of no account for a landing. What counts is the err
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from guidance.arrays import Array
 from guidance.state import State
+from hda.navigation.attitude import err_rates_into
 from hda.navigation.navigation_state import NavigationState, begin_navigation
 from hda.navigation.site_tracking import find_site, move_site, track_site
-from hda.navigation.steering import Sensing
+from hda.navigation.steering import GyroSensing, Sensing
 from hda.task.scenario import Scenario, ground_point
 
 _ABOVE = 1.0  # [m] over the target plane, which is the highest ground: beyond all rounding
@@ -49,12 +48,27 @@ def estimation_error(
     return np.concatenate([place - state.position, navigation.velocity - state.velocity])
 
 
-def attitude_error(scenario: Scenario) -> Array:
+def attitude_error(navigation: NavigationState | None) -> Array:
     """[rad] shape (3,), true minus believed attitude, a small rotation about the site's axes.
 
-    It is the tilt that the filter reckons with, one for the episode; none without a filter.
+    With a gyroscope it drifts and is corrected, else it is one tilt for the episode; none without a filter.
     """
-    return np.zeros(3) if scenario.sensor_errors is None else scenario.sensor_errors.tilt.copy()
+    return np.zeros(3) if navigation is None else navigation.errors.tilt.copy()
+
+
+def rate_error(scenario: Scenario, navigation: NavigationState | None, look: int) -> Array:
+    """[rad/s] shape (3,), believed minus true rates at a look, body frame; none without a gyroscope.
+
+    It is that of the first control period after the look.
+    """
+    system, error = scenario.preset.navigation, np.zeros(3)
+    if system is None or system.gyroscope is None or navigation is None:
+        return error
+    period, errors = scenario.preset.rules.control_period, navigation.errors.true_errors()
+    draws = scenario.streams.readings(look, scenario.preset.rules.control_periods, gyroscope=True).gyro
+    assert draws is not None
+    err_rates_into(navigation.memory(), errors, draws[0], period, system.gyroscope.numbers, error)
+    return error
 
 
 def displaced(state: State, error: Array) -> State:
@@ -83,10 +97,12 @@ def open_sensing(
         site: [m] shape (3,), the site that was decided on.
         look: number of the look.
     """
-    numbers = scenario.preset.filter_numbers
-    if numbers is None or navigation is None:
+    numbers, system = scenario.preset.filter_numbers, scenario.preset.navigation
+    if numbers is None or system is None or navigation is None:
         return None
-    draws = scenario.streams.readings(look, scenario.preset.rules.control_periods)
+    gyroscope, periods = system.gyroscope, scenario.preset.rules.control_periods
+    draws = scenario.streams.readings(look, periods, gyroscope is not None)
+    gyro = None if gyroscope is None or draws.gyro is None else GyroSensing(draws.gyro, gyroscope.numbers)
     return Sensing(
         move_site(navigation, site - target),
         navigation.errors.true_errors(),
@@ -97,6 +113,7 @@ def open_sensing(
         float(scenario.nominal_target[2]) + _ABOVE,
         site.copy(),
         navigation.instant,
+        gyro,
     )
 
 
@@ -121,7 +138,7 @@ def next_estimate(
     system = scenario.preset.navigation
     if system is None or navigation is None or sensing is None:
         return None
-    errors = replace(navigation.errors, accelerometer_bias=sensing.errors.accelerometer_bias)
+    errors = navigation.errors.moved_on(sensing.errors)
     instant = navigation.instant + scenario.preset.rules.control_periods
     flown = NavigationState(*sensing.memory, errors, instant)
     really, draws = ground_point(scenario, site), scenario.streams.site_fix(look)

@@ -82,7 +82,10 @@ class Observation:
             states it; None without a filter.
         attitude: unit quaternion, scalar first, shape (4,), that the lander believes to have: it turns body
             vectors into the site frame. None for a point mass.
-        rates: [rad/s] shape (3,), body frame; None for a point mass.
+        rates: [rad/s] shape (3,), body frame, as the gyroscope tells less the bias that the filter knows; the
+            true ones without a gyroscope, None for a point mass.
+        attitude_covariance: [rad^2] shape (3, 3), of the small turn about the site's axes by which the
+            attitude errs, as the filter states it; None for a point mass, and without a filter.
     """
 
     index: int
@@ -97,6 +100,7 @@ class Observation:
     covariance: Array | None = None
     attitude: Array | None = None
     rates: Array | None = None
+    attitude_covariance: Array | None = None
 
     @property
     def has_map(self) -> bool:

@@ -7,7 +7,8 @@ and errors of the estimated state.
 On `lidar` and `lidar-coarse` a look is no longer the true map with noise on it: ranges are measured to the
 same ground, 128 or 64 rays a side, gridded, and assessed on board; and the flight ends on the real ground.
 `navigated` is `lidar` by a lander that finds its state by sensors and a filter.
-On `rigid-body` that lander must turn to thrust elsewhere, and its sensor turns with it.
+On `rigid-body` that lander must turn to thrust elsewhere, its sensors turn with it, and its filter estimates
+its attitude.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from guidance.thrust_limits import pointing_angle
 from guidance.validation import finite_number, finite_vector, unknown_name
 from hda.ground.own_terrain import OwnTerrain
 from hda.navigation.layout import FilterNumbers
+from hda.navigation.sensors import Gyroscope
 from hda.navigation.system import NavigationSystem
 from hda.safety.criteria import SafetyCriteria
 from hda.safety.touchdown_stance import Stance
@@ -60,8 +62,8 @@ class Preset:
     Raises:
         ValueError: gravity does not point down, a start has no propellant or lies below the target plane,
             a body has no torque to lean with, flights end on real ground whose height no sensor measures,
-            there are both a filter and constant
-            errors, or a navigation sensor is not read at a whole number of control periods.
+            there are both a filter and constant errors, a gyroscope has no body, or a navigation sensor is
+            not read at a whole number of control periods.
     """
 
     name: str
@@ -92,6 +94,8 @@ class Preset:
         constant = self.rules.navigation_position_error, self.rules.navigation_velocity_error
         if self.navigation is not None and any(constant):
             raise ValueError("navigation by a filter leaves no constant navigation errors in the rules")
+        if self.navigation is not None and self.navigation.gyroscope is not None and self.body is None:
+            raise ValueError("a gyroscope needs a body that turns; give one, or leave the gyroscope out")
         if self.navigation is not None:
             _ = self.filter_numbers  # refuses a sensor that no instant can read
 
@@ -164,7 +168,7 @@ PRESETS: dict[str, Preset] = {
             terrain=PAPER_TERRAIN,
             lidar=RangingLidar(rays=128),
             touchdown=GroundTouchdown(),
-            navigation=NavigationSystem(),
+            navigation=NavigationSystem(gyroscope=Gyroscope()),
             body=DEFAULT_BODY,
         ),
     )

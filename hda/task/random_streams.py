@@ -110,9 +110,9 @@ class EpisodeStreams:
         """Stream of what errs for a whole episode in the navigation sensors."""
         return self._generator(_NAVIGATION)
 
-    def readings(self, index: int, periods: int) -> ReadingDraws:
+    def readings(self, index: int, periods: int, gyroscope: bool = False) -> ReadingDraws:
         """All that chance does to the navigation sensors over the control periods of interval `index`."""
-        return draw_readings(self._generator(_NAVIGATION, index), periods)
+        return draw_readings(self._generator(_NAVIGATION, index), periods, gyroscope)
 
     def site_fix(self, index: int) -> FixDraws:
         """All that chance does to the fix of the landing site in look `index`."""

@@ -10,24 +10,22 @@ from numpy.typing import NDArray
 from guidance.arrays import Array
 from guidance.state import State
 from hda.flight.record import EpisodeRecord
-from hda.flight.rigid import believed_attitude
 from hda.policies.privileged.knowable_ground import KnowableGround
 from hda.sensing.lidar import Lidar
 from hda.sensing.sensor_axis import sensor_axis
-from hda.task.estimation import attitude_error
-from hda.task.observation import Observation
 from hda.task.scenario import Scenario, ground_point, true_heights
 
 
 def read_pixels(
-    scenario: Scenario, observation: Observation
+    record: EpisodeRecord, index: int
 ) -> tuple[NDArray[np.int_], NDArray[np.int_], NDArray[np.bool_]]:
-    """Cells that a look's pixels show: rows (n,), columns (n,), and which pixels (n, n) read the ground.
+    """Cells that the pixels of look `index` show: rows (n,), columns (n,), and which (n, n) read the ground.
 
     Row i of the look shows row rows[i] of the tile. A pixel too far from the vertical, outside the map, or in
     a look without a map reads nothing; nor does one of a ranging LIDAR where Algorithm 1 has a hole. On a
     rigid body the limit counts from its own axis; there the holes of a ranging LIDAR alone tell.
     """
+    scenario, observation = record.scenario, record.observations[index]
     error = scenario.navigation_error
     aim = ground_point(scenario, observation.target)
     position = observation.state.position - error[:3]
@@ -38,7 +36,7 @@ def read_pixels(
     rays = np.empty((y.size, x.size, 3))
     rays[..., 0], rays[..., 1] = x - position[0], (y - position[1])[:, None]
     rays[..., 2] = aim[2] - position[2]
-    read = _within_limit(scenario, observation, rays) & inside
+    read = _within_limit(record, index, rays) & inside
     if observation.ground is not None:
         read &= observation.ground.known_map(observation.target, observation.width, rows.size)
     elif isinstance(scenario.preset.lidar, Lidar) and scenario.preset.lidar.dropout > 0.0:
@@ -46,16 +44,15 @@ def read_pixels(
     return rows, columns, read
 
 
-def _within_limit(scenario: Scenario, observation: Observation, rays: Array) -> NDArray[np.bool_]:
+def _within_limit(record: EpisodeRecord, index: int, rays: Array) -> NDArray[np.bool_]:
     """Which rays [m] to the ground, shape (n, n, 3), the sensor's off-nadir limit allows."""
-    limit = scenario.preset.lidar.off_nadir_limit
-    if observation.attitude is None:
+    limit, flown = record.scenario.preset.lidar.off_nadir_limit, record.segments[index].body_path
+    if flown is None:
         farthest = -math.tan(limit) * rays[..., 2]
         return rays[..., 0] ** 2 + rays[..., 1] ** 2 <= farthest * farthest
-    if observation.ground is not None:
+    if record.observations[index].ground is not None:
         return np.ones(rays.shape[:2], dtype=bool)
-    true = believed_attitude(observation.attitude, -attitude_error(scenario))  # the turn back
-    return rays @ sensor_axis(true) >= math.cos(limit) * np.linalg.norm(rays, axis=2)
+    return rays @ sensor_axis(flown[0, 6:10]) >= math.cos(limit) * np.linalg.norm(rays, axis=2)
 
 
 def count_safe_cells(record: EpisodeRecord) -> tuple[int, int]:
@@ -64,8 +61,8 @@ def count_safe_cells(record: EpisodeRecord) -> tuple[int, int]:
     truth = scenario.tile.deterministic
     seen: set[tuple[int, int]] = set()
     reached: set[tuple[int, int]] = set()
-    for observation in record.observations:
-        rows, columns, read = read_pixels(scenario, observation)
+    for index, observation in enumerate(record.observations):
+        rows, columns, read = read_pixels(record, index)
         where = np.argwhere(read)
         cells = {(int(rows[i]), int(columns[j])) for i, j in where if truth[rows[i], columns[j]]}
         seen |= cells
@@ -98,7 +95,7 @@ def last_reading(record: EpisodeRecord) -> tuple[int, float, bool] | None:
         pixel = observation.pixel(site)
         if pixel is None:
             continue
-        rows, columns, read = read_pixels(scenario, observation)
+        rows, columns, read = read_pixels(record, index)
         if read[pixel]:
             safe = bool(scenario.tile.deterministic[rows[pixel[0]], columns[pixel[1]]])
             return index, float(observation.safety_map[pixel]), safe

@@ -142,4 +142,4 @@ NAVIGATION_FACTORS: tuple[Factor, ...] = (
         (5.0, 1.0, 0.0),
     ),
 )
-"""Every sensor of `hda.navigation.sensors`, and the start."""
+"""Every sensor of `hda.navigation.sensors` but the gyroscope of a body, and the start."""

@@ -52,8 +52,8 @@ def test_read_pixels_are_those_of_the_sensor(error: float) -> None:
         rules=replace(HARD.rules, navigation_position_error=error),
     )
     record = fly(make_policy("nearest-safe"), sample_scenario(preset, 1, 0))
-    for observation in record.observations:
-        rows, columns, read = read_pixels(record.scenario, observation)
+    for index, observation in enumerate(record.observations):
+        rows, columns, read = read_pixels(record, index)
         shown = np.zeros(read.shape, dtype=np.float32)
         where = np.nonzero(read)
         shown[where] = record.scenario.tile.probability[rows[where[0]], columns[where[1]]]
@@ -66,14 +66,14 @@ def test_on_a_body_they_are_those_within_its_own_cone(limit: float) -> None:
     lidar = replace(HARD.lidar, noise=0.0, off_nadir_limit=math.radians(limit))
     preset = replace(HARD, name="with-a-body", lidar=lidar, body=DEFAULT_BODY)
     record = fly(make_policy("nearest-safe"), sample_scenario(preset, 1, 0))
-    turned = 0
-    for observation in record.observations:
-        rows, columns, read = read_pixels(record.scenario, observation)
+    turned, upright_segments = 0, tuple(replace(segment, body_path=None) for segment in record.segments)
+    for index, observation in enumerate(record.observations):
+        rows, columns, read = read_pixels(record, index)
         shown = np.zeros(read.shape, dtype=np.float32)
         where = np.nonzero(read)
         shown[where] = record.scenario.tile.probability[rows[where[0]], columns[where[1]]]
         assert np.array_equal(shown, observation.safety_map)
-        _, _, upright = read_pixels(record.scenario, replace(observation, attitude=None))
+        _, _, upright = read_pixels(replace(record, segments=upright_segments), index)
         turned += not np.array_equal(read, upright)
     assert turned > 0
 
@@ -83,8 +83,8 @@ def test_on_a_body_that_measures_ranges_the_map_alone_tells_what_was_read() -> N
     preset = replace(PRESETS["rigid-body"], name="fixed-sensor", lidar=lidar)
     record = fly(make_policy("nearest-safe"), sample_scenario(preset, 1, 0))
     shown = 0
-    for observation in record.observations:
-        rows, _, read = read_pixels(record.scenario, observation)
+    for index, observation in enumerate(record.observations):
+        rows, _, read = read_pixels(record, index)
         assert observation.ground is not None
         known = observation.ground.known_map(observation.target, observation.width, rows.size)
         assert not (read & ~known).any()

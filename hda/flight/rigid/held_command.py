@@ -17,7 +17,8 @@ from guidance.arrays import Array
 from guidance.kernel import compile_kernel
 from guidance.rigid_body.attitude_loop import drive_into
 from guidance.rigid_body.motion import fly_into
-from hda.flight.rigid.turning import Turning, believe_into, reckon_engine
+from hda.flight.rigid.turning import Turning, reckon_engine
+from hda.navigation.attitude import believe_into, drift
 from hda.safety.touchdown_stance import Footing, contact_height, highest_around
 
 FLYING, TOUCHDOWN, TANK_EMPTY = 0, 1, 2
@@ -143,6 +144,8 @@ def _fly_piece(
     start, thrust, torque = state.copy(), np.zeros((2, 3)), np.zeros((2, 3))
     believed = state.copy()
     believe_into(state[6:10], turning.tilt, believed[6:10])
+    for axis in range(3):
+        believed[10 + axis] += turning.rate_error[axis]
     drive_into(believed, (wanted, turning.aim), turning.body, turning.loop, (thrust[0], torque[0]))
     commanded = thrust[0, 2] if burns and state[13] > dry_mass else 0.0
     thrust[:, 2] = commanded * (1.0 + error)
@@ -154,9 +157,11 @@ def _fly_piece(
         time = _emptying_instant(turning, piece, time, dry_mass)
     touched = _find_contact(turning, piece, time, plane, footing)
     if touched >= 0.0:
-        reckon_engine(turning, commanded, touched, start[13] - state[13])
-        return touched, TOUCHDOWN
+        time = touched
     reckon_engine(turning, commanded, time, start[13] - state[13])
+    drift(turning.tilt, start[6:10], state[6:10], turning.rate_error, time)
+    if touched >= 0.0:
+        return touched, TOUCHDOWN
     if empty:
         state[13] = dry_mass
         return time, TANK_EMPTY

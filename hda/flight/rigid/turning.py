@@ -1,7 +1,8 @@
 """A rigid body under way between two looks: its state, what it believes of it, and how its engine answers.
 
-The attitude that the loop steers by errs by one small turn, the tilt of the inertial unit that the filter
-reckons with (`hda.navigation.layout`); rates are known. Where there is no filter both are known.
+The attitude that the loop steers by errs by one small turn, the tilt of the inertial unit. With a gyroscope
+it drifts and the filter corrects it (`hda.navigation.attitude`), and the rates err too. Without one the tilt
+stays, and rates are known; where there is no filter both are known.
 """
 
 from __future__ import annotations
@@ -18,6 +19,9 @@ from guidance.rigid_body.attitude_loop import LoopNumbers
 from guidance.rigid_body.body import BodyNumbers
 from guidance.rigid_body.state import SIZE, RigidState
 from guidance.validation import finite_vector
+from hda.navigation.attitude import believe_into, err_rates_into
+from hda.navigation.layout import Turn
+from hda.navigation.steering import GyroSensing, Sensing
 
 
 class Turning(NamedTuple):
@@ -36,6 +40,7 @@ class Turning(NamedTuple):
         aim: [N] shape (3,), site frame, along which the body points in the present period; its size is of no
             account.
         lead: [s] by which it points ahead of a plan.
+        rate_error: [rad/s] shape (3,), believed minus true rates in the present control period, body frame.
     """
 
     state: Array
@@ -46,6 +51,7 @@ class Turning(NamedTuple):
     engine: Array
     aim: Array
     lead: float
+    rate_error: Array
 
 
 PlainTurning = tuple[
@@ -57,6 +63,7 @@ PlainTurning = tuple[
     Array,
     Array,
     float,
+    Array,
 ]
 """`Turning` without names: numba takes plain tuples from Python several times as fast."""
 
@@ -70,15 +77,15 @@ def begin_turning(
         state: where it starts.
         body: the vehicle.
         loop: the gains.
-        tilt: [rad] shape (3,), true minus believed attitude.
+        tilt: [rad] shape (3,), true minus believed attitude; a gyroscope's drift changes it.
         lead: [s] by which it points ahead of a plan.
         nodes: of the path.
     """
     engine = np.array([float(np.linalg.norm(state.thrust)), 0.0, 0.0])
     path = np.empty((nodes, SIZE))
     path[0] = state.as_array()
-    state_now, aim = path[0].copy(), np.zeros(3)
-    return state_now, tilt, tuple(body), tuple(loop), path, engine, aim, lead  # pyright: ignore[reportReturnType]
+    state_now, aim, rate_error = path[0].copy(), np.zeros(3), np.zeros(3)
+    return state_now, tilt, tuple(body), tuple(loop), path, engine, aim, lead, rate_error  # pyright: ignore[reportReturnType]
 
 
 @compile_kernel
@@ -86,8 +93,8 @@ def name_turning(plain: PlainTurning | None) -> Turning | None:
     """Give a plain tuple its names."""
     if plain is None:
         return None
-    state, tilt, body, loop, path, engine, aim, lead = plain
-    return Turning(state, tilt, BodyNumbers(*body), LoopNumbers(*loop), path, engine, aim, lead)
+    state, tilt, body, loop, path, engine, aim, lead, rate_error = plain
+    return Turning(state, tilt, BodyNumbers(*body), LoopNumbers(*loop), path, engine, aim, lead, rate_error)
 
 
 @compile_kernel
@@ -100,23 +107,49 @@ def keep_state(turning: Turning | None, node: int) -> None:
 
 
 @compile_kernel
-def believe_into(attitude: Array, tilt: Array, out: Array) -> None:
-    """Write the attitude that the lander believes to have into `out`.
+def read_gyro(turning: Turning | None, sensing: Sensing | None, number: int, period: float) -> None:
+    """Draw by how much a body misjudges its rates in control period `number` of [s] `period`.
 
     Args:
-        attitude: the true unit quaternion, shape (4,).
-        tilt: [rad] shape (3,): the true attitude is the believed one, turned by it about the site's axes.
-        out: unit quaternion, shape (4,), not `attitude`.
+        turning: its `rate_error` is written; None: a point mass.
+        sensing: the filter; without one, or without a gyroscope, the rates are known.
+        number: of the period in its interval.
+        period: [s].
     """
-    x, y, z = -0.5 * tilt[0], -0.5 * tilt[1], -0.5 * tilt[2]
-    w, a, b, c = attitude[0], attitude[1], attitude[2], attitude[3]
-    out[0] = w - x * a - y * b - z * c
-    out[1] = a + x * w + y * c - z * b
-    out[2] = b + y * w + z * a - x * c
-    out[3] = c + z * w + x * b - y * a
-    length = math.sqrt(out[0] ** 2 + out[1] ** 2 + out[2] ** 2 + out[3] ** 2)
-    for number in range(4):
-        out[number] /= length
+    if turning is None:
+        return
+    if sensing is None:
+        return
+    _read_gyro(turning, sensing, sensing.gyro, number, period)
+
+
+@compile_kernel
+def _read_gyro(
+    turning: Turning, sensing: Sensing, gyro: GyroSensing | None, number: int, period: float
+) -> None:
+    """The gyroscope is an argument of its own: numba leaves out what follows from None in these alone."""
+    if gyro is None:
+        return
+    draws, out = gyro.draws[number], turning.rate_error
+    err_rates_into(sensing.memory, sensing.errors, draws, period, gyro.numbers, out)
+
+
+@compile_kernel
+def turn_of(turning: Turning | None, sensing: Sensing | None, number: int) -> Turn | None:
+    """How a body turned in control period `number`, for its filter; None where no gyroscope tells."""
+    if turning is None:
+        return None
+    if sensing is None:
+        return None
+    return _turn_of(turning, sensing.gyro, number)
+
+
+@compile_kernel
+def _turn_of(turning: Turning, gyro: GyroSensing | None, number: int) -> Turn | None:
+    if gyro is None:
+        return None
+    before, after = turning.path[number, 6:10], turning.path[number + 1, 6:10]
+    return Turn(before, after, gyro.draws[number], gyro.numbers)
 
 
 def believed_attitude(attitude: ArrayLike, tilt: ArrayLike) -> Array:

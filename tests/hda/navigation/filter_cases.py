@@ -31,10 +31,14 @@ ALONE = NavigationSystem(altimeter=None, velocimeter=None, terrain=None, site=No
 
 @dataclass(frozen=True, eq=False)
 class Descent:
-    """Times [s] shape (n,) and true states (n, 7) at the control instants of a flight to TARGET."""
+    """A flight to TARGET: times [s] shape (n,) and true states (n, 7) at its control instants.
+
+    Of a body with a gyroscope also true attitudes, shape (n, 4).
+    """
 
     time: Array
     path: Array
+    attitude: Array | None = None
 
 
 def fly_descent(rng: np.random.Generator) -> Descent:
@@ -71,8 +75,9 @@ class Run:
     """A filter taken along a whole descent of m legs, one from each look to the next, and n control periods.
 
     Attributes:
-        error: shape (m, 13), estimate minus truth at the end of each leg.
-        covariance: shape (m, 20, 20), there.
+        error: shape (m, 13), estimate minus truth at the end of each leg; with a gyroscope (m, 23), zeros for
+            what is considered.
+        covariance: shape (m, 20, 20), there; with a gyroscope (m, 23, 23).
         squares: shape (n, 3), of altimeter, velocimeter and terrain fix.
         site_squares: shape (m - 1,), of the site's fixes at the looks after the first; NaN without one.
         final: the filter at the end.
@@ -100,10 +105,15 @@ def run_filter(system: NavigationSystem, descent: Descent, ground: Array, rng: n
             site_squares.append(square)
         heights = (path[:, 2] - ground)[first + 1 : last + 1]
         leg = (time[first : last + 1], path[first : last + 1], heights)
-        navigation, log = navigate(system, navigation, leg, draw_readings(rng, last - first))
+        if descent.attitude is not None:
+            leg = (*leg, descent.attitude[first : last + 1])
+        draws = draw_readings(rng, last - first, gyroscope=descent.attitude is not None)
+        navigation, log = navigate(system, navigation, leg, draws)
         squares.append(log.innovation_square)
-        bias = navigation.errors.accelerometer_bias
-        truth = np.concatenate([path[last, :6], bias, ground[last : last + 1], TARGET])
+        errors = navigation.errors
+        truth = np.concatenate([path[last, :6], errors.accelerometer_bias, ground[last : last + 1], TARGET])
+        if system.gyroscope is not None:
+            truth = np.concatenate([truth, np.zeros(4), errors.tilt, errors.gyro_bias])
         error.append(navigation.estimate - truth)
         covariance.append(navigation.covariance)
     return Run(

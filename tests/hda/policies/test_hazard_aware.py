@@ -24,6 +24,7 @@ from hda.policies.site_price import (
     predict_next_look,
     price_sites,
 )
+from hda.task.body_variants import vary_body
 from hda.task.observation import Observation
 from hda.task.scenario import sample_scenario
 
@@ -183,6 +184,19 @@ def test_the_next_look_is_predicted_by_coasting():
     assert ahead.useful
     late = replace(observation, time_to_go=7.0)
     assert not predict_next_look(late, scenario.view, (0, 0), 2.5).useful
+
+
+def test_a_sensor_fixed_to_a_body_sees_ground_about_the_easiest_landing():
+    gimballed = sample_scenario("rigid-body", 3, 0, "tuning")
+    fixed = sample_scenario(vary_body(gimballed.preset, "body-fixed-sensor"), 3, 0, "tuning")
+    observation = observe(fixed, begin_flight(fixed))
+    state, coasted = observation.state, predict_next_look(observation, gimballed.view, (0, 0), 8.0)
+    ahead = predict_next_look(observation, fixed.view, (100, 200), 8.0)
+    expected = state.position + 0.5 * observation.time_to_go * state.velocity
+    assert (ahead.east, ahead.north) == pytest.approx((expected[0] - 100.0, expected[1] - 200.0))
+    assert ahead.height == coasted.height
+    assert ahead.nadir_radius == pytest.approx(ahead.height * math.tan(math.radians(5.7)))
+    assert coasted.east == pytest.approx(state.position[0] + 5.0 * state.velocity[0])
 
 
 def test_the_site_is_kept_once_committed_and_at_the_plane():

@@ -10,11 +10,13 @@ import hda
 from guidance.rigid_body import DEFAULT_BODY
 from guidance.rigid_body.attitude_loop import DEFAULT_LOOP
 from guidance.rigid_body.loop_response import fly_turn
+from guidance.tracking.looks_ahead import LooksAhead
 from hda.flight.episode import begin_flight, observe
 from hda.policies.hazard_aware import HazardAwareSite
 from hda.policies.planned_descent import PlannedDescent
 from hda.policies.turning_law import TurningLaw, reversal_time
 from hda.policy import DecisionStatus, PlanCommand, Policy
+from hda.task.body_variants import vary_body
 from hda.task.scenario import sample_scenario
 
 
@@ -53,6 +55,21 @@ def test_a_body_is_planned_for_smoothly_and_a_point_mass_as_ever():
     assert isinstance(plain, PlanCommand)
     assert plain.lead == 0.0
     assert plain.lateral_gains is None
+
+
+def test_with_a_sensor_fixed_to_the_body_a_plan_pays_for_its_looks():
+    scenario = sample_scenario("rigid-body", 3, 0, split="tuning")
+    preset = vary_body(scenario.preset, "body-fixed-sensor")
+    fixed = sample_scenario(preset, 3, 0, split="tuning")
+    look = observe(scenario, begin_flight(scenario))
+    plain, seeing = (TurningLaw().plan(look, look.target, world.view) for world in (scenario, fixed))
+    assert plain is not None
+    assert seeing is not None
+    options = replace(TurningLaw().options, looks=LooksAhead(5.0, math.radians(5.7), 8.0, price=0.0))
+    indifferent = TurningLaw(options).plan(look, look.target, scenario.view)
+    assert indifferent is not None
+    cost = [float(np.linalg.norm(plan.thrust_acceleration, axis=1).sum()) for plan in (indifferent, seeing)]
+    assert cost[1] > cost[0] * (1.0 - 1e-9)  # of the same flights, the cheapest and one that sees
 
 
 def test_a_site_is_kept_when_a_late_divert_comes_too_late():

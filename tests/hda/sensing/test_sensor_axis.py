@@ -13,7 +13,7 @@ from guidance.state import State
 from hda.sensing.lidar import Lidar, look
 from hda.sensing.ranging import RangingLidar, scan
 from hda.sensing.scan_draws import draw_scan
-from hda.sensing.sensor_axis import cone_rim, is_outside, sensor_axis
+from hda.sensing.sensor_axis import cone_rim, is_fixed, is_outside, sensor_axis
 
 PLANE = 50.0
 TARGET = np.array([150.0, 150.0, PLANE])
@@ -22,6 +22,14 @@ FLAT = np.full((300, 300), PLANE, dtype=np.float32)
 SENSOR = RangingLidar(rays=32)
 PERFECT = replace(SENSOR, pointing_error=0.0, pointing_jitter=0.0, scan_duration=0.0)
 VECTORS = st.tuples(*[st.floats(-1.0, 1.0)] * 3)
+
+
+def test_a_sensor_is_fixed_that_looks_no_further_aside_than_its_field_of_view():
+    assert not is_fixed(SENSOR)
+    half = math.radians(5.7)
+    for sensor in (SENSOR, Lidar()):
+        assert is_fixed(replace(sensor, off_nadir_limit=half))
+        assert not is_fixed(replace(sensor, off_nadir_limit=1.01 * half))
 
 
 def leaning(turn: tuple[float, float, float]) -> RigidState:

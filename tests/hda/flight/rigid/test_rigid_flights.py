@@ -15,6 +15,7 @@ from guidance.rigid_body import DEFAULT_BODY, AttitudeLoop, RigidBody, rotate
 from hda.flight.episode import begin_flight, fly_legs, observe
 from hda.flight.outcome import Outcome
 from hda.flight.picture import save_flight
+from hda.navigation import Gyroscope, NavigationSystem
 from hda.policy import Policy
 from hda.task.presets import PRESETS, Preset
 from hda.task.scenario import Scenario, sample_scenario
@@ -66,14 +67,15 @@ def test_an_observation_shows_the_attitude_that_the_lander_believes_to_have():
     assert seen.attitude is not None
     assert seen.rates is not None
     assert scenario.sensor_errors is not None
-    np.testing.assert_array_equal(seen.rates, np.zeros(3))
+    assert 0.0 < np.abs(seen.rates).max() < math.radians(0.02)  # a bias of 1 deg/h, and noise
+    assert seen.attitude_covariance is not None
+    np.testing.assert_allclose(seen.attitude_covariance, 1e-6 * np.eye(3), rtol=1e-9)
     tilt = scenario.sensor_errors.tilt
     up = np.array([0.0, 0.0, 1.0])
     np.testing.assert_allclose(rotate(seen.attitude, up), up - np.cross(tilt, up), atol=1e-5)
     point = sample_scenario("navigated", 21, 0, split="tuning")
     plain = observe(point, begin_flight(point))
-    assert plain.attitude is None
-    assert plain.rates is None
+    assert plain.attitude is plain.rates is plain.attitude_covariance is None
 
 
 def test_a_record_holds_the_bodys_states_at_the_control_instants():
@@ -157,8 +159,11 @@ def test_engine_and_tank_of_the_body_are_those_of_the_presets_lander():
 
 
 def test_the_preset_is_navigated_with_a_body():
-    preset = PRESETS["rigid-body"]
-    assert replace(preset, name="navigated", body=None) == PRESETS["navigated"]
+    preset, plain = PRESETS["rigid-body"], PRESETS["navigated"]
+    assert replace(preset, name="navigated", body=None, navigation=plain.navigation) == plain
+    assert preset.navigation == NavigationSystem(gyroscope=Gyroscope())
+    with pytest.raises(ValueError, match="a gyroscope needs a body"):
+        replace(preset, body=None)
     body = preset.body
     assert body is not None
     assert (body.inertia, body.torque_limit) == ((880.0, 880.0, 1040.0), (66.0, 66.0, 66.0))
