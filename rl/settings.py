@@ -127,15 +127,22 @@ class OffPolicyAgentSettings(OffPolicySettings, AgentSettings):
     Attributes:
         control_prior_weight: of the actor's penalty that draws the gains and the clock to their nominal
             values (td3 and those with memory; see `rl.learning.td3.FastTD3`).
-        control_prior_step: environment step from which it holds: first free, then settled.
+        shift_prior_weight: of the same penalty for the shift of the target, which makes each move of the site
+            cost something.
+        control_prior_step: environment step from which both hold: first free, then settled.
     """
 
     control_prior_weight: float = 0.2
+    shift_prior_weight: float = 0.0
     control_prior_step: int = 165_000
 
     def control_prior_at(self, step: int) -> float:
         """Weight of the penalty that draws the gains and the clock to their nominal values."""
         return self.control_prior_weight if step >= self.control_prior_step else 0.0
+
+    def shift_prior_at(self, step: int) -> float:
+        """Weight of the penalty that draws the shift of the target to 0."""
+        return self.shift_prior_weight if step >= self.control_prior_step else 0.0
 
 
 @dataclass(frozen=True)

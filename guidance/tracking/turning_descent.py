@@ -108,7 +108,7 @@ def _evaluate(coefficients: Array, share: Array, order: int) -> Array:
     powers = np.arange(coefficients.shape[0])
     factor = np.array([math.perm(p, order) for p in powers], dtype=np.float64)
     basis = factor * share[:, None] ** np.maximum(powers - order, 0)
-    return np.tensordot(basis, coefficients, axes=1)
+    return np.asarray(np.tensordot(basis, coefficients, axes=1), np.float64)
 
 
 def plan_turning_descent(

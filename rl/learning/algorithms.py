@@ -32,7 +32,9 @@ def make_agent_with_memory(settings: RecurrentSettings, env: Any, seed: int) -> 
     hyperparameters = Hyperparameters(plus=settings.algorithm == "td3-lstm-plus", **chosen)
     agent = RecurrentTD3(env, hyperparameters, seed, settings.learning_rate_at)
     controls = (np.arange(agent.sizes.action) < count_controls(settings)).astype(np.float32)
-    agent.action_prior = lambda step: settings.control_prior_at(step) * controls
+    agent.action_prior = lambda step: (
+        settings.control_prior_at(step) * controls + settings.shift_prior_at(step) * (1.0 - controls)
+    )
     return agent
 
 
@@ -101,6 +103,7 @@ def make_off_policy(settings: OffPolicyAgentSettings, env: Any, seed: int) -> Of
     if isinstance(algorithm, FastTD3):
         algorithm.controls = count_controls(settings)
         algorithm.control_prior = lambda: settings.control_prior_at(algorithm.num_timesteps)
+        algorithm.shift_prior = lambda: settings.shift_prior_at(algorithm.num_timesteps)
         algorithm.target_policy_noise = settings.smoothing_noise
         algorithm.target_noise_clip = 2.5 * settings.smoothing_noise
     if settings.algorithm in ("td3", "ddpg"):

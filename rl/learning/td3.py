@@ -26,10 +26,12 @@ class FastTD3(TD3):
             inputs of its last tanh, of all elements but the shift of the target; it draws the gains to 6/2
             and the rate of the clock to 1. A critic of landings that end in +1, -1 or -10 errs by more than
             the gains are worth, and an actor that follows its errors lands hard.
+        shift_prior: as `control_prior`, for the shift of the target: a move that gains less than it is not made.
         controls: so many elements of the action, the first ones, are not a shift of the target.
     """
 
     control_prior: Callable[[], float] | None = None
+    shift_prior: Callable[[], float] | None = None
     controls: int = CONTROLS
 
     def __init__(self, policy: Any, env: Any, *args: Any, **kwargs: Any) -> None:
@@ -79,6 +81,8 @@ class FastTD3(TD3):
         loss = -self.critic.q1_forward(observations, torch.tanh(inputs)).mean()
         if self.control_prior is not None and (weight := self.control_prior()) > 0.0:
             loss = loss + weight * inputs[:, : self.controls].square().sum(1).mean()
+        if self.shift_prior is not None and (weight := self.shift_prior()) > 0.0:
+            loss = loss + weight * inputs[:, self.controls :].square().sum(1).mean()
         self.actor.optimizer.zero_grad()
         loss.backward()
         self.actor.optimizer.step()

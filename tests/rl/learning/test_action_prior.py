@@ -35,6 +35,14 @@ def test_the_recipe_draws_gains_and_clock_and_not_the_target(agent):
     assert not after[CONTROLS:].any()
 
 
+def test_a_weight_draws_the_shift_too():
+    recipe = replace(RECIPE, shift_prior_weight=0.05)
+    prior = make_agent_with_memory(recipe, LunarHDAEnv(), 0).action_prior
+    assert prior is not None
+    assert (prior(recipe.control_prior_step)[CONTROLS:] == np.float32(0.05)).all()
+    assert not prior(recipe.control_prior_step - 1).any()
+
+
 def test_the_penalty_is_the_weighted_mean_square_over_what_counts(agent):
     batch = SequenceTensors.of(agent.sample(), True)
     prior = torch.tensor([0.5, 0.0, 2.0, 0.0, 0.0])

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -45,6 +47,14 @@ def test_the_prior_brings_gains_and_clock_to_nominal_and_leaves_the_target():
     assert float(inputs[:, CONTROLS:].min()) > 0.5
 
 
+def test_the_shift_prior_brings_the_shift_to_nothing_and_leaves_the_rest():
+    model = flat_critic(1.0)
+    model.shift_prior = lambda: 0.01
+    inputs = inputs_of_tanh(model, 600).abs()
+    assert float(inputs[:, CONTROLS:].max()) < 0.05
+    assert float(inputs[:, :CONTROLS].min()) > 0.5
+
+
 def test_the_critic_learns_while_the_actor_does_not_touch_it():
     model = flat_critic(0.0)
     model.control_prior = lambda: 1.0
@@ -68,6 +78,8 @@ def test_the_learning_rate_decays_linearly_between_its_ends_and_the_prior_sets_i
         0,
         settings.control_prior_weight,
     ]
+    drawn = replace(settings, shift_prior_weight=0.05)
+    assert [drawn.shift_prior_at(k) for k in (0, step - 1, step)] == [0.0, 0.0, 0.05]
 
 
 def test_the_algorithm_follows_its_settings():
