@@ -32,8 +32,10 @@ def make_agent_with_memory(settings: RecurrentSettings, env: Any, seed: int) -> 
     hyperparameters = Hyperparameters(plus=settings.algorithm == "td3-lstm-plus", **chosen)
     agent = RecurrentTD3(env, hyperparameters, seed, settings.learning_rate_at)
     controls = (np.arange(agent.sizes.action) < count_controls(settings)).astype(np.float32)
+    shift = np.float32(1.0) - controls
     agent.action_prior = lambda step: (
-        settings.control_prior_at(step) * controls + settings.shift_prior_at(step) * (1.0 - controls)
+        np.float32(settings.control_prior_at(step)) * controls
+        + np.float32(settings.shift_prior_at(step)) * shift
     )
     return agent
 

@@ -26,7 +26,7 @@ class FastTD3(TD3):
             inputs of its last tanh, of all elements but the shift of the target; it draws the gains to 6/2
             and the rate of the clock to 1. A critic of landings that end in +1, -1 or -10 errs by more than
             the gains are worth, and an actor that follows its errors lands hard.
-        shift_prior: as `control_prior`, for the shift of the target: a move that gains less than it is not made.
+        shift_prior: as `control_prior`, for the shift of the target: what gains less is not moved.
         controls: so many elements of the action, the first ones, are not a shift of the target.
     """
 
