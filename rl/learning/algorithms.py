@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rl.environment.action import CONTROLS
+from rl.inference.arrays import Array32
 from rl.settings import (
     AgentSettings,
     OffPolicyAgentSettings,
@@ -31,12 +32,13 @@ def make_agent_with_memory(settings: RecurrentSettings, env: Any, seed: int) -> 
     chosen = {field.name: getattr(settings, field.name) for field in fields(SequenceSettings)}
     hyperparameters = Hyperparameters(plus=settings.algorithm == "td3-lstm-plus", **chosen)
     agent = RecurrentTD3(env, hyperparameters, seed, settings.learning_rate_at)
-    controls = (np.arange(agent.sizes.action) < count_controls(settings)).astype(np.float32)
-    shift = np.float32(1.0) - controls
-    agent.action_prior = lambda step: (
-        np.float32(settings.control_prior_at(step)) * controls
-        + np.float32(settings.shift_prior_at(step)) * shift
-    )
+
+    def prior_at(step: int) -> Array32:
+        weights = np.full(agent.sizes.action, settings.shift_prior_at(step), np.float32)
+        weights[: count_controls(settings)] = settings.control_prior_at(step)
+        return weights
+
+    agent.action_prior = prior_at
     return agent
 
 
