@@ -69,16 +69,21 @@ class AgentActions:
     remembers: bool
 
     @property
-    def _actor(self) -> Any:
+    def actor(self) -> Any:
+        """Its network with sight and steering; read once per process.
+
+        Raises:
+            ArtefactError: the weights are missing, damaged or foreign.
+        """
         return (load_memory_actor if self.remembers else load_actor)(shipped(self.name))
 
     def begin(self, view: ScenarioView, rng: np.random.Generator) -> Any:
         """Memory of network and sight."""
-        return self._actor.begin(view)
+        return self.actor.begin(view)
 
     def act(self, observation: Observation, memory: Any) -> tuple[Array32, Any]:
         """The action of its network."""
-        return self._actor.act(observation, memory)
+        return self.actor.act(observation, memory)
 
 
 def behaviour_names() -> tuple[str, ...]:
@@ -105,7 +110,7 @@ def find_behaviour(name: str) -> Behaviour:
         )
     card = read_card(shipped(name).with_suffix(".json"), "actor")
     agent = AgentActions(name, card["algorithm"] in WITH_MEMORY)
-    if agent._actor.design.ranges != PAPER_ACTIONS:
+    if agent.actor.design.ranges != PAPER_ACTIONS:
         raise ValueError(f"policies must have the action ranges of LunarHDA-v0, {name!r} has others")
     return agent
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import json
 import sys
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from shutil import rmtree
@@ -25,6 +25,7 @@ from guidance.validation import finite_number
 if TYPE_CHECKING:
     from rich.progress import Progress
 
+    from rl.dataset.data_card import DatasetIdentity
     from rl.dataset.flights import Block
     from rl.dataset.plain_file import Dataset
 
@@ -71,47 +72,57 @@ def run_dataset(options: MakeDataset, command: str) -> None:
         ValueError: an option is out of range, or the folder holds another dataset.
         OfflineLibrariesError: Minari's file is asked for and its libraries are not installed.
     """
-    from importlib.metadata import version
-
     from rich.console import Console
     from rich.progress import Progress
 
-    from rl.dataset.data_card import describe_dataset
+    from rl.dataset.data_card import describe_dataset, identify_dataset
     from rl.dataset.minari_file import write_minari
     from rl.dataset.plain_file import write_dataset
 
-    identity = {**_check(options), "version": version("lunar-hda")}
-    parts = _open_folder(options, identity)
+    _check(options)
+    _prepare_ground(options)
+    identity = identify_dataset(options.preset, options.split, options.study_seed, options.policies)
+    dataset, folder = _find_finished(options, identity), options.out / "minari"
     with Progress() as progress:
-        finished = _finished(options, identity)
-        dataset = finished or _fly_dataset(options, {**identity, "command": command}, parts, progress)
-        if finished is None:
+        if dataset is None:
+            parts = _open_parts(options, identity)
+            dataset = _fly_dataset(options, {**identity.json, "command": command}, parts, progress)
+            rmtree(folder, ignore_errors=True)  # of another dataset, if there is one
             write_dataset(options.out / "dataset.npz", dataset)
-        data, folder = dataset.transitions, options.out / "minari"
-        if options.minari and (finished is None or not folder.exists()):
+        data = dataset.transitions
+        if options.minari and not folder.exists():
             bar = progress.add_task("Minari's file", total=data.length.size)
             write_minari(folder, dataset, partial(progress.advance, bar))
     (options.out / "card.json").write_text(json.dumps(dataset.card, indent=1, sort_keys=True) + "\n")
     (options.out / "README.md").write_text(describe_dataset(dataset.card), encoding="utf-8")
-    rmtree(parts, ignore_errors=True)
+    rmtree(options.out / "parts", ignore_errors=True)
     Console().print(f"wrote {options.out}: {data.length.size} episodes, {len(data.actions)} steps")
 
 
-def _finished(options: MakeDataset, identity: dict[str, Any]) -> Dataset | None:
-    """What an earlier call has flown to the end; None where none has.
+def _find_finished(options: MakeDataset, identity: DatasetIdentity) -> Dataset | None:
+    """What an earlier call has flown to the end; None where none has. Nothing is written.
 
     Raises:
-        ValueError: it is another dataset.
+        ValueError: it is another dataset, or `resume` is not set.
     """
     from rl.dataset.plain_file import read_dataset
 
-    file, asked = options.out / "dataset.npz", {**identity, "episodes": options.episodes}
+    file, asked = options.out / "dataset.npz", {**identity.json, "episodes": options.episodes}
     if not file.exists():
         return None
-    found = read_dataset(file)
-    if {name: found.card.get(name) for name in asked} != json.loads(json.dumps(asked)):
+    _ask_for_resume(options)
+    found = read_dataset(file, most_bytes=sys.maxsize)  # a file of this command's own
+    if {name: found.card.get(name) for name in asked} != asked:
         raise ValueError(f"{options.out} holds another dataset: pass another --out")
     return found
+
+
+def _ask_for_resume(options: MakeDataset) -> None:
+    """Refuse to go on with a folder unasked."""
+    if not options.resume:
+        raise ValueError(
+            f"{options.out} already holds a dataset: pass --resume to go on with it, or another --out"
+        )
 
 
 def _fly_dataset(options: MakeDataset, card: dict[str, Any], parts: Path, progress: Progress) -> Dataset:
@@ -130,21 +141,18 @@ def _fly_dataset(options: MakeDataset, card: dict[str, Any], parts: Path, progre
     if len(kept) != len(blocks):
         raise OSError(f"{parts} has lost files as episodes were flown: pass --resume to fly them again")
     data = join_transitions(kept)
-    scores = score_policies(data, options.policies)
+    scores = [asdict(score) for score in score_policies(data, options.policies)]
     return Dataset({**card, "episodes": options.episodes, "scores": scores}, data)
 
 
-def _check(options: MakeDataset) -> dict[str, Any]:
-    """What decides the numbers; the tiles are built.
+def _check(options: MakeDataset) -> None:
+    """Refuse what cannot be flown or written.
 
     Raises:
         ValueError: an option is out of range.
         OfflineLibrariesError: as of `run_dataset`.
     """
-    from hda.ground.library import Ground, prepare_tiles, tile_numbers
-    from hda.task.presets import find_preset
     from rl.dataset.behaviours import find_behaviour
-    from rl.dataset.data_card import identify_dataset
     from rl.dataset.minari_file import require_offline_libraries
 
     for name, least in (("episodes", 1), ("workers", 1), ("study_seed", 0)):
@@ -155,34 +163,53 @@ def _check(options: MakeDataset) -> dict[str, Any]:
         find_behaviour(name)
     if options.minari:
         require_offline_libraries()
+
+
+def _prepare_ground(options: MakeDataset) -> None:
+    """Build the tiles, before processes share them.
+
+    Raises:
+        ValueError: there is no such preset or split.
+    """
+    from hda.ground.library import Ground, prepare_tiles, tile_numbers
+    from hda.task.presets import find_preset
+
     preset = find_preset(options.preset)
     ground = Ground(preset.terrain, preset.criteria)
     tile_numbers(options.split, ground)
     prepare_tiles(ground, options.split)
-    return identify_dataset(options.preset, options.split, options.study_seed, options.policies)
 
 
-def _open_folder(options: MakeDataset, identity: dict[str, Any]) -> Path:
-    """Where the finished blocks are kept.
+def _open_parts(options: MakeDataset, identity: DatasetIdentity) -> Path:
+    """Where the finished blocks are kept. Without a readable record of whose they are they are flown anew.
 
     Raises:
-        ValueError: the folder holds a dataset and `resume` is not set, or one of other data.
+        ValueError: there are some and `resume` is not set, or they are of other data.
     """
     parts = options.out / "parts"
     record = parts / "identity.json"
-    asked = json.loads(json.dumps(identity))
-    if record.exists() or (options.out / "dataset.npz").exists():
-        if not options.resume:
-            raise ValueError(
-                f"{options.out} already holds a dataset: pass --resume to go on with it, or another --out"
-            )
-        if record.exists() and json.loads(record.read_text()) != asked:
-            raise ValueError(
-                f"{options.out} was begun with other policies, ground, seed or software: pass another --out"
-            )
+    if record.exists():
+        _ask_for_resume(options)
+    begun = _read_record(record)
+    if begun is None:
+        rmtree(parts, ignore_errors=True)
+    elif begun != identity.json:
+        raise ValueError(
+            f"{options.out} was begun with other policies, ground, seed or software: pass another --out"
+        )
     parts.mkdir(parents=True, exist_ok=True)
-    record.write_text(json.dumps(asked, sort_keys=True))
+    draft = record.with_suffix(".draft")
+    draft.write_text(json.dumps(identity.json, sort_keys=True))
+    draft.replace(record)
     return parts
+
+
+def _read_record(record: Path) -> Any:
+    """What the blocks beside a record are of; None where none can be read."""
+    try:
+        return json.loads(record.read_text())
+    except (OSError, ValueError, RecursionError):
+        return None
 
 
 def _fly_blocks(options: MakeDataset, parts: Path, progress: Progress) -> list[Block]:

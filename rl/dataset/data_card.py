@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
+import json
+from dataclasses import asdict, dataclass
+from importlib.metadata import version
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,46 +20,129 @@ from rl.inference.artefacts import library_versions
 _SUCCESS = 1
 
 
-def identify_dataset(preset: str, split: str, study_seed: int, policies: tuple[str, ...]) -> dict[str, Any]:
-    """What decides the numbers of a dataset, but how many episodes there are; JSON."""
+class Ratio(NamedTuple):
+    """[%] how often something came about; the card lists the three numbers.
+
+    Attributes:
+        value: share of the episodes.
+        low: lower end of Wilson's 95 % interval.
+        high: its upper end.
+    """
+
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class PolicyScore:
+    """How a policy flew.
+
+    Attributes:
+        policy: name.
+        episodes: how many.
+        steps: of all of them.
+        success_percent: [%] successes.
+        safe_site_percent: [%] touchdowns on safe ground.
+        reward: mean over the episodes of their undiscounted sums.
+    """
+
+    policy: str
+    episodes: int
+    steps: int
+    success_percent: Ratio
+    safe_site_percent: Ratio
+    reward: float
+
+
+@dataclass(frozen=True)
+class PolicyIdentity:
+    """Who flew.
+
+    Attributes:
+        name: of the policy.
+        weights_sha256: digest of its weights; None for draws.
+    """
+
+    name: str
+    weights_sha256: str | None
+
+
+@dataclass(frozen=True)
+class DatasetIdentity:
+    """What decides the numbers of a dataset, but how many episodes there are.
+
+    Attributes:
+        environment: id.
+        preset: setting.
+        split: tile split.
+        ground: key of the tiles' parameters.
+        study_seed: of the episodes.
+        policies: who flew.
+        endings: their names by code.
+        sources: digest of the program's sources.
+        versions: of the libraries.
+        version: of the program.
+    """
+
+    environment: str
+    preset: str
+    split: str
+    ground: str
+    study_seed: int
+    policies: tuple[PolicyIdentity, ...]
+    endings: dict[int, str]
+    sources: str
+    versions: dict[str, str]
+    version: str
+
+    @property
+    def json(self) -> dict[str, Any]:
+        """As the card says it when it is read back."""
+        return json.loads(json.dumps(asdict(self)))
+
+
+def identify_dataset(preset: str, split: str, study_seed: int, policies: tuple[str, ...]) -> DatasetIdentity:
+    """What this program would fly."""
     from guidance.kernel import source_hash
 
     setting = find_preset(preset)
-    return {
-        "environment": "LunarHDA-v0",
-        "preset": preset,
-        "split": split,
-        "ground": Ground(setting.terrain, setting.criteria).key,
-        "study_seed": study_seed,
-        "policies": [{"name": name, "weights_sha256": weights_digest(name)} for name in policies],
-        "endings": {code: str(ending) for ending, code in ENDING_CODES.items()},
-        "sources": source_hash(),
-        "versions": library_versions(),
-    }
+    return DatasetIdentity(
+        environment="LunarHDA-v0",
+        preset=preset,
+        split=split,
+        ground=Ground(setting.terrain, setting.criteria).key,
+        study_seed=study_seed,
+        policies=tuple(PolicyIdentity(name, weights_digest(name)) for name in policies),
+        endings={code: str(ending) for ending, code in ENDING_CODES.items()},
+        sources=source_hash(),
+        versions=library_versions(),
+        version=version("lunar-hda"),
+    )
 
 
-def score_policies(transitions: Transitions, policies: tuple[str, ...]) -> list[dict[str, Any]]:
-    """How each policy flew: episodes, steps, ratios with Wilson's 95 % intervals [%], mean reward."""
+def score_policies(transitions: Transitions, policies: tuple[str, ...]) -> list[PolicyScore]:
+    """How each policy flew."""
     return [
-        {
-            "policy": name,
-            "episodes": int(own.sum()),
-            "steps": int(transitions.length[own].sum()),
-            "success_percent": _ratio(transitions.ending[own] == _SUCCESS),
-            "safe_site_percent": _ratio(transitions.safe_site[own]),
-            "reward": float(transitions.returns[own].mean()),
-        }
+        PolicyScore(
+            policy=name,
+            episodes=int(own.sum()),
+            steps=int(transitions.length[own].sum()),
+            success_percent=_ratio(transitions.ending[own] == _SUCCESS),
+            safe_site_percent=_ratio(transitions.safe_site[own]),
+            reward=float(transitions.returns[own].mean()),
+        )
         for place, name in enumerate(policies)
         for own in [transitions.policy == place]
     ]
 
 
-def _ratio(events: NDArray[np.bool_]) -> list[float]:
-    """[%] the ratio, and the ends of its interval."""
+def _ratio(events: NDArray[np.bool_]) -> Ratio:
+    """The share, and its interval."""
     from scipy.stats import binomtest
 
     found = binomtest(int(events.sum()), events.size).proportion_ci(method="wilson")
-    return [100.0 * float(value) for value in (events.mean(), found.low, found.high)]
+    return Ratio(*(100.0 * float(value) for value in (events.mean(), found.low, found.high)))
 
 
 def describe_dataset(card: dict[str, Any]) -> str:

@@ -9,18 +9,21 @@ from __future__ import annotations
 import json
 import zipfile
 import zlib
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.lib.npyio import NpzFile
 
 from rl.dataset.transitions import KINDS, Transitions
 
 FORMAT_VERSION = 1
 _CARD = "card"
 _LONGEST_CARD = 1_000_000  # characters
+_LONGEST_HEADER = 100_000  # bytes
+MOST_BYTES = 4 * 1024**3
+"""What the arrays of a file may come to unpacked, unless its reader allows more."""
 
 
 class DatasetError(ValueError):
@@ -54,19 +57,21 @@ def write_dataset(path: Path, dataset: Dataset) -> None:
     draft.replace(path)
 
 
-def read_dataset(path: Path) -> Dataset:
+def read_dataset(path: Path, most_bytes: int = MOST_BYTES) -> Dataset:
     """Read a file that `write_dataset` wrote, whoever gave it to you.
 
+    Args:
+        path: the file.
+        most_bytes: what its arrays may come to unpacked; a small file may unpack to very much.
+
     Raises:
-        DatasetError: it is missing, damaged or no such file; the message names it.
+        DatasetError: it is missing, damaged, too large or no such file; the message names it.
     """
     try:
-        # opened here: numpy leaves a damaged archive open
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as members:
-            if not isinstance(members, NpzFile) or set(members.files) != {_CARD, *KINDS}:
-                raise DatasetError("is not a dataset of this program")
-            card = _read_card(members[_CARD])
-            transitions = Transitions(**{name: members[name] for name in KINDS})
+        with zipfile.ZipFile(path) as file:
+            _refuse_members(file.infolist(), most_bytes)
+            card = _read_card(_read_member(file, _CARD))
+            transitions = Transitions(**{name: _read_member(file, name) for name in KINDS})
     except DatasetError as error:
         raise DatasetError(f"{path}: {error}") from error
     except (
@@ -78,6 +83,28 @@ def read_dataset(path: Path) -> Dataset:
     if transitions.policy.size and not 0 <= transitions.policy.min() <= transitions.policy.max() < known:
         raise DatasetError(f"{path}: names a policy that its card does not list")
     return Dataset(card, transitions)
+
+
+def _refuse_members(members: Sequence[zipfile.ZipInfo], most_bytes: int) -> None:
+    """Judge by the directory, before anything is unpacked; no more is unpacked than it says.
+
+    Raises:
+        DatasetError: other members than those of a dataset, or too large ones.
+    """
+    if sorted(member.filename for member in members) != sorted(f"{name}.npy" for name in (_CARD, *KINDS)):
+        raise DatasetError("is not a dataset of this program")
+    sizes = {member.filename: member.file_size for member in members}
+    if sizes.pop(f"{_CARD}.npy") > 4 * _LONGEST_CARD + _LONGEST_HEADER:
+        raise DatasetError("the card is no text")
+    if (size := sum(sizes.values())) > most_bytes:
+        raise DatasetError(
+            f"its arrays unpack to {size} bytes, more than {most_bytes}: pass most_bytes if you trust it"
+        )
+
+
+def _read_member(file: zipfile.ZipFile, name: str) -> Any:
+    with file.open(f"{name}.npy") as member:
+        return np.lib.format.read_array(member, allow_pickle=False)
 
 
 def _read_card(member: Any) -> dict[str, Any]:

@@ -16,20 +16,35 @@ _BURNT = "propellant_percent", "propellant_percent_low", "propellant_percent_hig
 
 
 @dataclass(frozen=True)
+class Estimate:
+    """A mean over episodes, and its interval.
+
+    Attributes:
+        value: of all episodes.
+        low: lower end of the interval; nan where the table has none.
+        high: its upper end; likewise.
+    """
+
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
 class FlownPolicy:
     """A row of a study's table.
 
     Attributes:
         preset: setting that was flown.
         policy: name.
-        success: [%] estimate, and the ends of its interval.
-        propellant: [%] the same; nan for ends that the table does not have.
+        success: [%].
+        propellant: [%].
     """
 
     preset: str
     policy: str
-    success: tuple[float, float, float]
-    propellant: tuple[float, float, float]
+    success: Estimate
+    propellant: Estimate
 
 
 @dataclass(frozen=True)
@@ -64,17 +79,10 @@ def read_tables(folders: Sequence[Path]) -> list[FlownPolicy]:
         try:
             with (folder / "table.csv").open(newline="", encoding="utf-8") as file:
                 for row in csv.DictReader(file):
-                    success = tuple(float(row[name]) for name in _SUCCESS)
-                    burnt = tuple(
-                        float(row.get(name) or math.nan)
-                        for name in (
-                            "propellant_percent",
-                            "propellant_percent_low",
-                            "propellant_percent_high",
-                        )
-                    )
                     key = row["preset"], row["policy"].removesuffix(" *")
-                    rows[key] = FlownPolicy(*key, success, burnt)  # type: ignore[arg-type] - three numbers each
+                    success = Estimate(*(float(row[name]) for name in _SUCCESS))
+                    burnt = Estimate(*(float(row.get(name) or math.nan) for name in _BURNT))
+                    rows[key] = FlownPolicy(*key, success, burnt)
         except (OSError, KeyError, TypeError, ValueError) as error:
             raise ValueError(f"{folder} holds no table of policies on presets: {error!r}") from error
     return list(rows.values())
@@ -93,22 +101,40 @@ def read_seeds(cards: Sequence[Path], runs: Sequence[Path]) -> list[SeedScore]:
     """
     scores: dict[tuple[str, str, int], SeedScore] = {}
     for path in cards:
-        training = read_card(path, "actor")["training"]
-        preset = training["preset"]
-        agent = training.get("recipe", path.stem.removesuffix(f"-{preset}"))
-        for entry in training["seeds"]:
-            flown = entry["validation"]
-            numbers = flown["success_percent"], flown["propellant_percent"]
-            key = preset, agent, entry["seed"]
-            scores[key] = SeedScore(*key, "validation", *numbers)
+        scores.update(_read_card_seeds(path))
     for folder in runs:
         card, rows = read_run(folder), read_rows(folder / "validation.csv")
         if not rows:
             raise ValueError(f"{folder} has no validated actor")
         key = card["preset"], card["recipe"], card["seed"]
-        numbers = float(rows[-1]["success_percent"]), float(rows[-1]["propellant_percent"])
-        scores.setdefault(key, SeedScore(*key, "tuning", *numbers))
+        try:
+            numbers = float(rows[-1]["success_percent"]), float(rows[-1]["propellant_percent"])
+            scores.setdefault(key, SeedScore(*key, "tuning", *numbers))
+        except (KeyError, TypeError, ValueError) as error:
+            raise ValueError(f"{folder} has no validated actor: {error!r}") from error
     return list(scores.values())
+
+
+def _read_card_seeds(path: Path) -> dict[tuple[str, str, int], SeedScore]:
+    """Scores of a card's seeds, by preset, agent and seed.
+
+    Raises:
+        ValueError: as of `read_seeds`.
+        ArtefactError: likewise.
+    """
+    card, scores = read_card(path, "actor"), {}
+    try:
+        training = card["training"]
+        preset = training["preset"]
+        agent = training.get("recipe", path.stem.removesuffix(f"-{preset}"))
+        for entry in training["seeds"]:
+            flown = entry["validation"]
+            numbers = float(flown["success_percent"]), float(flown["propellant_percent"])
+            key = preset, agent, entry["seed"]
+            scores[key] = SeedScore(*key, "validation", *numbers)
+    except (KeyError, TypeError, AttributeError, ValueError) as error:
+        raise ValueError(f"{path} is not a card of exported weights: {error!r}") from error
+    return scores
 
 
 def find_cards(folder: Path) -> list[Path]:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from hda.flight.palette import COLORS, MATPLOTLIB_DASHES, line_style
-from rl.figures.agent_scores import FlownPolicy, SeedScore, find_cards, read_seeds, read_tables
+from rl.figures.agent_scores import Estimate, FlownPolicy, SeedScore, find_cards, read_seeds, read_tables
 from rl.figures.options import AgentsFigure
 from rl.figures.sheet import open_figure
 from rl.policies.actor import weights_name
@@ -62,12 +62,12 @@ def _draw_lines(axes: Axes, flown: dict[str, FlownPolicy], names: Sequence[str],
         if name not in flown:
             continue
         style = line_style(len(COLORS) - 1 - k)
-        middle, low, high = getattr(flown[name], measure)
+        found: Estimate = getattr(flown[name], measure)
         axes.axhline(
-            middle, color=style["color"], linestyle=MATPLOTLIB_DASHES["dash"], linewidth=1.2, label=name
+            found.value, color=style["color"], linestyle=MATPLOTLIB_DASHES["dash"], linewidth=1.2, label=name
         )
-        if not math.isnan(low):
-            axes.axhspan(low, high, color=style["color"], alpha=0.12, linewidth=0.0)
+        if not math.isnan(found.low):
+            axes.axhspan(found.low, found.high, color=style["color"], alpha=0.12, linewidth=0.0)
 
 
 def _draw_agents(
@@ -96,11 +96,14 @@ def _draw_agents(
     ):
         rows = [(place, row) for place, agent in enumerate(agents) if (row := _row(flown, agent, learnt))]
         if rows:
-            values = [getattr(row, measure) for _, row in rows]
-            ends = [[max(0.0, abs(value[end] - value[0])) for value in values] for end in (1, 2)]
+            found: list[Estimate] = [getattr(row, measure) for _, row in rows]
+            middles = [each.value for each in found]
+            ends = [
+                [abs(each.low - each.value) for each in found],
+                [abs(each.high - each.value) for each in found],
+            ]
             ends = [[0.0 if math.isnan(end) else end for end in side] for side in ends]
             places = [place + (0.1 if learnt else 0.25) for place, _ in rows]
-            middles = [value[0] for value in values]
             axes.errorbar(
                 places, middles, yerr=ends, fmt="D", color=color, markersize=4, capsize=2, label=label
             )

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from rl.figures import AgentsFigure, draw_agents
-from rl.figures.agent_scores import read_seeds, read_tables
-from rl.inference.artefacts import WEIGHTS_FOLDER, read_card
+from rl.figures.agent_scores import Estimate, read_seeds, read_tables
+from rl.inference.artefacts import WEIGHTS_FOLDER, load_artefact, read_card, save_artefact
 from tests.drawing import bar_ends, legend_words, line_data
 
 HEAD = (
@@ -90,8 +91,8 @@ def test_a_later_table_replaces_and_marks_are_dropped(results: tuple[Path, Path]
     newer.mkdir()
     (newer / "table.csv").write_text(f"{HEAD}td3,paper,9,50,40,60,68,67,69\n")
     rows = {(row.preset, row.policy): row for row in read_tables((*results, newer))}
-    assert rows["paper", "td3"].success == (50.0, 40.0, 60.0)
-    assert rows["paper", "oracle"].propellant == (60.0, 59.0, 61.0)
+    assert rows["paper", "td3"].success == Estimate(50.0, 40.0, 60.0)
+    assert rows["paper", "oracle"].propellant == Estimate(60.0, 59.0, 61.0)
 
 
 def test_what_cannot_be_drawn_is_named(tmp_path: Path) -> None:
@@ -102,3 +103,44 @@ def test_what_cannot_be_drawn_is_named(tmp_path: Path) -> None:
     (tmp_path / "table.csv").write_text("policy,preset\na,b\n")
     with pytest.raises(ValueError, match="holds no table of policies on presets"):
         draw_agents(AgentsFigure((tmp_path,)))
+
+
+def without(card: dict[str, Any], place: list[Any]) -> dict[str, Any]:
+    """A card that lacks what stands at a place."""
+    cut = json.loads(json.dumps(card))
+    *way, last = place
+    part = cut
+    for step in way:
+        part = part[step]
+    del part[last]
+    return cut
+
+
+@pytest.mark.parametrize(
+    "place",
+    [
+        ["training"],
+        ["training", "preset"],
+        ["training", "seeds"],
+        ["training", "seeds", 0, "seed"],
+        ["training", "seeds", 0, "validation"],
+        ["training", "seeds", 0, "validation", "propellant_percent"],
+    ],
+    ids=str,
+)
+def test_a_card_that_lacks_something_is_named(tmp_path: Path, place: list[Any]) -> None:
+    own = load_artefact(WEIGHTS_FOLDER / "td3", "actor")
+    path = tmp_path / "td3.json"
+    save_artefact(path.with_suffix(""), "actor", own.tensors, own.card)
+    assert read_seeds([path], [])
+    save_artefact(path.with_suffix(""), "actor", own.tensors, without(own.card, place))
+    with pytest.raises(ValueError, match=r"td3\.json is not a card of exported weights"):
+        read_seeds([path], [])
+
+
+def test_a_run_whose_log_lacks_a_column_is_named(tmp_path: Path) -> None:
+    card = {"preset": "lidar", "recipe": "td3", "seed": 1, "settings": {}, "plan": {}}
+    (tmp_path / "run.json").write_text(json.dumps(card))
+    (tmp_path / "validation.csv").write_text("step,success_percent\n10,40\n")
+    with pytest.raises(ValueError, match=f"{tmp_path.name} has no validated actor"):
+        read_seeds([], [tmp_path])

@@ -130,3 +130,51 @@ def test_what_is_no_archive_is_refused(tmp_path: Path) -> None:
     for name in ("a.npy", "b.npz", "none.npz"):
         with pytest.raises(DatasetError, match=name):
             read_dataset(tmp_path / name)
+
+
+def write_members(path: Path, contents: dict[str, bytes]) -> None:
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as file:
+        for name, content in contents.items():
+            file.writestr(name, content)
+
+
+def members_of(path: Path) -> dict[str, bytes]:
+    with zipfile.ZipFile(path) as file:
+        return {name: file.read(name) for name in file.namelist()}
+
+
+@pytest.mark.parametrize(
+    ("name", "message"), [("card", "the card is no text"), ("rewards", "unpack to .* pass most_bytes")]
+)
+def test_a_small_file_that_unpacks_to_much_is_refused_unread(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, message: str
+) -> None:
+    path = tmp_path / "d.npz"
+    write_dataset(path, Dataset(CARD, make_transitions([2], 0)))
+    write_members(path, {**members_of(path), f"{name}.npy": bytes(20_000_000)})
+    assert path.stat().st_size < 40_000
+
+    def unpack(*_: Any) -> Any:
+        raise AssertionError("it was unpacked")
+
+    monkeypatch.setattr(zipfile.ZipFile, "open", unpack)
+    with pytest.raises(DatasetError, match=message):
+        read_dataset(path, most_bytes=10_000_000)
+
+
+def test_a_limit_is_that_of_all_arrays_together(tmp_path: Path) -> None:
+    path = tmp_path / "d.npz"
+    write_dataset(path, Dataset(CARD, make_transitions([2, 3], 0)))
+    size = sum(len(content) for name, content in members_of(path).items() if name != "card.npy")
+    assert read_dataset(path, size).card["preset"] == "paper"
+    with pytest.raises(DatasetError, match=f"unpack to {size} bytes, more than {size - 1}"):
+        read_dataset(path, size - 1)
+
+
+def test_a_member_given_twice_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "d.npz"
+    write_dataset(path, Dataset(CARD, make_transitions([2], 0)))
+    with zipfile.ZipFile(path, "a") as file, pytest.warns(UserWarning, match="Duplicate"):
+        file.writestr("rewards.npy", b"")
+    with pytest.raises(DatasetError, match="is not a dataset"):
+        read_dataset(path)

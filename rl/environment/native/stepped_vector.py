@@ -30,7 +30,8 @@ class SteppedEpisodes:
         scenarios: what is flown.
         seen: shape (n, o), what each sees at present.
         infos: the numbers of each.
-        actions: shape (n, k, a), of the episode under way: from its beginning they lead to where it stands.
+        actions: shape (n, k, a), of the episode under way: from its beginning they lead to where it stands;
+            0 beyond.
         landed: as of `Batch`.
         timed_out: as of `Batch`.
     """
@@ -58,6 +59,7 @@ class SteppedEpisodes:
         environment = self.environments[place]
         self.seen[place], self.infos[place] = environment.reset(options={"scenario": scenario})
         self._steps[place], self.landed[place], self.timed_out[place] = 0, False, False
+        self.actions[place] = 0.0  # what is kept tells nothing of earlier episodes
 
     def advance(self, actions: NDArray[np.floating]) -> Array:
         """Fly an action of each episode to the next look or the ground: the rewards, shape (n,).

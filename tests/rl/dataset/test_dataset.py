@@ -82,6 +82,7 @@ def test_who_has_no_such_actions_is_refused() -> None:
 
 
 SMALL = MakeDataset(("td3", "random"), 5, workers=1, minari=False)
+DRAWS = replace(SMALL, policies=("random",), episodes=2)
 
 
 def test_a_stopped_call_goes_on_to_the_same_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -124,6 +125,46 @@ def test_a_stopped_call_goes_on_to_the_same_bytes(tmp_path: Path, monkeypatch: p
     page = (whole.out / "README.md").read_text()
     assert "`made`" in page
     assert "| td3 | 5 |" in page
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def test_wrong_options_leave_a_finished_folder_as_it_was(tmp_path: Path) -> None:
+    right = replace(DRAWS, out=tmp_path)
+    run_dataset(right, "made")
+    before = contents(tmp_path)
+    for changes in ({"study_seed": 1}, {"episodes": 3}, {"policies": ("td3",)}):
+        with pytest.raises(ValueError, match="holds another dataset"):
+            run_dataset(replace(right, resume=True, **changes), "made")
+        assert contents(tmp_path) == before
+    run_dataset(replace(right, resume=True), "made")
+    assert (tmp_path / "dataset.npz").read_bytes() == before["dataset.npz"]
+    with pytest.raises(ValueError, match="already holds a dataset"):
+        run_dataset(right, "made")
+
+
+@pytest.mark.parametrize("left", ["", '{"environment": "Lun'])
+def test_a_record_cut_short_counts_for_none(tmp_path: Path, left: str) -> None:
+    """Whose the blocks beside it are is not known: they are flown anew."""
+    options = replace(DRAWS, out=tmp_path / "cut")
+    run_dataset(replace(DRAWS, out=tmp_path / "whole"), "made")
+    (options.out / "parts").mkdir(parents=True)
+    (options.out / "parts" / "identity.json").write_text(left)
+    foreign = options.out / "parts" / "random-00000000.npz"
+    foreign.write_bytes((tmp_path / "whole" / "dataset.npz").read_bytes())
+    with pytest.raises(ValueError, match="already holds a dataset"):
+        run_dataset(options, "made")
+    run_dataset(replace(options, resume=True), "made")
+    assert contents(options.out) == contents(tmp_path / "whole")
+
+
+def test_a_file_of_minaris_goes_with_its_dataset(tmp_path: Path) -> None:
+    (tmp_path / "minari").mkdir()
+    (tmp_path / "minari" / "old").write_text("of another dataset")
+    run_dataset(replace(DRAWS, out=tmp_path), "made")
+    assert not (tmp_path / "minari").exists()
 
 
 @pytest.mark.parametrize(

@@ -180,6 +180,25 @@ def test_every_recipe_learns_for_all_steps_of_its_command():
         recipe.refuse_steps(STEPS[name])
 
 
+def test_the_page_says_what_each_recipe_has():
+    page = (Path(__file__).parents[3] / "docs" / "explanation" / "agents.md").read_text(encoding="utf-8")
+    table = page[page.index("| | `ppo` |") :].split("\n\n")[0]
+    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in table.splitlines()]
+    (_, *names), _, *said = rows
+    recipes = {name.strip("`"): ON_POLICY_RECIPES[name.strip("`")] for name in names}
+    assert set(recipes) == set(ON_POLICY_RECIPES)
+    expected = {
+        "steps": [f"{STEPS[name]:,}".replace(",", " ") for name in recipes],
+        "environments": [str(one.environments) for one in recipes.values()],
+        "decisions of each between updates": [str(one.horizon) for one in recipes.values()],
+        "decisions of a gradient step": [str(one.batch_size) for one in recipes.values()],
+        "deviation of the draws at the start": [f"$e^{one.log_deviation:g}$" for one in recipes.values()],
+    }
+    assert {
+        name: [cell.replace("{", "").replace("}", "") for cell in cells] for name, *cells in said
+    } == expected
+
+
 def test_thrusts_on_measured_looks_are_refused_with_the_way_out(tmp_path):
     with pytest.raises(ValueError, match="got 'lidar': thrusts are flown on paper, hard, partial"):
         run_training(tmp_path, PRESETS["lidar"], SMALL["ppo-thrust"], plan("ppo-thrust", 48), resume=False)

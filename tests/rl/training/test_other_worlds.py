@@ -14,11 +14,14 @@ from hda.task.presets import PRESETS
 from hda.task.scenario import sample_scenario
 from rl.environment.native.stepped_vector import SteppedVectorEnv
 from rl.inference.artefacts import load_artefact
+from rl.policies.actor import AgentPolicy
+from rl.policies.recurrent_actor import RecurrentAgentPolicy
 from rl.recipes import RECIPES
-from rl.settings import AgentSettings
+from rl.settings import WITH_MEMORY, AgentSettings
 from rl.training.actor_export import policy_of
 from rl.training.run import make_environment, run_training
 from rl.training.run_folder import TrainingPlan
+from tests.equality import same
 
 FEW: dict[str, Any] = {"hidden": (8, 8), "batch_size": 8, "random_steps": 8, "replay_size": 60}
 TINY: dict[str, Any] = {"environments": 2, "horizon": 6, "batch_size": 6, "epochs": 1}
@@ -40,8 +43,13 @@ def learn_cut_and_whole(tmp_path: Path, preset: str, settings: AgentSettings, na
     a, b = (load_artefact(folder / "actors" / "step-000000036", "actor") for folder in (whole, cut))
     assert set(a.tensors) == set(b.tensors)
     assert all(np.array_equal(tensor, b.tensors[key]) for key, tensor in a.tensors.items())
-    record = fly(policy_of(a.tensors, settings), sample_scenario(preset, 0, 0, "tuning"))
-    assert record.outcome is not None
+    kind = RecurrentAgentPolicy if settings.algorithm in WITH_MEMORY else AgentPolicy
+    scenario = sample_scenario(preset, 0, 0, "tuning")
+    shipped = fly(kind("agent", whole / "actors" / "step-000000036"), scenario)
+    assert shipped.decisions
+    assert all(np.isfinite(decision.site).all() for decision in shipped.decisions)
+    kept = fly(policy_of(a.tensors, settings), scenario)  # as the run itself judged it
+    assert same(kept.decisions, shipped.decisions)
 
 
 @pytest.mark.slow
@@ -59,9 +67,10 @@ def test_proximal_policies_learn_on_measured_looks(tmp_path: Path, name: str, pr
 
 
 @pytest.mark.parametrize("changes", [{"sight": "belief"}, {"guidance": "convex"}], ids=str)
+@pytest.mark.parametrize("name", ["ppo", "recurrent-ppo"])
 def test_proximal_policies_learn_on_beliefs_and_on_convex_guidance(
-    tmp_path: Path, changes: dict[str, Any]
+    tmp_path: Path, name: str, changes: dict[str, Any]
 ) -> None:
-    settings = replace(SMALL["ppo"], **changes)
+    settings = replace(SMALL[name], **changes)
     assert isinstance(make_environment(settings, PRESETS["paper"]), SteppedVectorEnv)
-    learn_cut_and_whole(tmp_path, "paper", settings, "ppo")
+    learn_cut_and_whole(tmp_path, "paper", settings, name)
