@@ -118,6 +118,8 @@ def prove_cell(state: State, site: Array, lander: Lander, gravity: Array, arriva
         levels = [
             _least_bound(piece, proof) + arrival.change(piece.primer, velocity) for piece in proof.pieces
         ]
+    # without a glide slope no limit on the path leans, so that b alone says what another place costs
+    assert not any(piece.path_multiplier[:2].any() for piece in proof.pieces)
     slopes = np.array([piece.primer[3:5] for piece in proof.pieces])
     return CellBound(site[:2].copy(), np.array(levels), slopes, proof.spent_at_most)
 

@@ -32,7 +32,7 @@ from studies.campaign.run_options import FolderOptions
 from studies.columns import console_table, write_csv, write_markdown
 from studies.information_bound.restrictions import FloorRow, bound_episode, list_restrictions
 from studies.information_bound.table import COLUMNS, StepRow, list_steps, tell_recognition, tell_sight
-from studies.information_bound.told import told_name, told_path
+from studies.information_bound.told import check_frame, told_name, told_path
 
 _FIRST, _LAST = "oracle-fuel", "hazard-aware"
 
@@ -42,7 +42,7 @@ class InformationBound(FolderOptions):
     """Command line.
 
     Attributes:
-        preset: the setting; flights must end on the target plane.
+        preset: the setting; point masses that know where they are must fly, to the target plane.
         episodes: episodes that are bounded, and flown by each policy.
         looks: numbers of the looks at which hazard-aware is told the map, rising.
         study_seed: seed of the study; equal seeds give equal tables.
@@ -76,6 +76,7 @@ def plan_study(options: InformationBound) -> Study:
     """
     preset = find_preset(options.preset)
     list_restrictions(preset)
+    check_frame(preset)
     tile_numbers(options.split, Ground(preset.terrain, preset.criteria))
     _, paths = choose_policies((_FIRST, *map(told_path, options.looks), _LAST), preset.name)
     names = (_FIRST, *map(told_name, options.looks), _LAST)

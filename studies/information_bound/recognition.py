@@ -1,10 +1,11 @@
 """What the first look tells of the map, and a bound that is penalised by what the clairvoyant peeks at.
 
 The ground of an episode is one tile of a split that anyone can generate, so what a policy may know of it
-after the first look is the posterior over those tiles. It is computed exactly. With any function V of tile
-and landing place, V(truth, s) - sum_j P(j | look) V(j, s) has the mean zero for every rule that settles s by
-the look: added to the loss, it takes from the clairvoyant what knowing the tile is worth (Brown, Smith and
-Sun, Operations Research 58, 2010).
+after the first look is the posterior over those tiles. It is computed up to the quadrature of how many first
+targets each tile has. With any function V of tile and landing place, V(truth, s) - sum_j P(j | look) V(j, s)
+has the mean zero, up to that quadrature, for every rule that settles s by the look: added to the loss, it
+takes from the clairvoyant what knowing the tile is worth (Brown, Smith and Sun, Operations Research 58,
+2010).
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ from hda.task.scenario import Scenario
 
 MOST_TILES = 100
 """A split with more tiles is not asked."""
-_LATTICE = 10.0  # [m] between places that are tried as first targets
+_LATTICE = 10.0  # [m] greatest side of the squares in whose middles first targets are tried
 
 
 def penalised_loss(loss: Array, weights: Array, truth: int, value: Array) -> float:
@@ -62,8 +63,7 @@ class Candidates:
 
     Attributes:
         tiles: m of them.
-        density: shape (m,), of a first target on each, up to one factor: one over the share of places in the
-            target area that are first targets.
+        density: shape (m,), of a first target on each, up to one factor: one over its `target_share`.
     """
 
     tiles: tuple[Tile, ...]
@@ -80,10 +80,19 @@ def candidate_tiles(scenario: Scenario) -> Candidates:
 def _candidates(ground: Ground, split: str, start: StartConditions) -> Candidates:
     opened = (load_tile(ground, number, split) for number in tile_numbers(split, ground))
     tiles = tuple(tile for tile in opened if offers_targets(tile, start))
-    area = np.arange(start.target_area.low, start.target_area.high + 0.5 * _LATTICE, _LATTICE)
-    places = [np.array(place) for place in product(area, repeat=2)]
-    shares = [np.mean([_is_target(tile, place, start) for place in places]) for tile in tiles]
-    return Candidates(tiles, 1.0 / np.maximum(shares, 1.0 / len(places)))
+    return Candidates(tiles, np.array([1.0 / target_share(tile, start) for tile in tiles]))
+
+
+def target_share(tile: Tile, start: StartConditions) -> float:
+    """Share of the target area that is first targets, by the midpoint rule on squares of at most 10 m.
+
+    Where it finds none, as much as one square: for tiles over which episodes begin.
+    """
+    area = start.target_area
+    side = max(1, math.ceil((area.high - area.low) / _LATTICE))
+    middles = area.low + (np.arange(side) + 0.5) * (area.high - area.low) / side
+    found = sum(_is_target(tile, np.array(place), start) for place in product(middles, repeat=2))
+    return max(found, 1) / side**2
 
 
 def _is_target(tile: Tile, place: Array, start: StartConditions) -> bool:

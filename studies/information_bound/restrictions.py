@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from guidance.arrays import Array
+from guidance.lander import Lander
 from hda.policies.planned_descent import PlannedDescent
 from hda.policies.privileged.oracle import safe_clearance
 from hda.task.presets import Preset
@@ -40,6 +41,7 @@ class Restriction:
     Attributes:
         name: what is asked of them, in words.
         thrust: greatest share of the greatest thrust that the engine gives.
+        least_thrust: least share of the least thrust that it gives.
         arrival: how a landing may end, before the terminal phase.
         clearance: [m] of safe ground around the site.
         gate: [m] height at which the terminal phase begins; 0 without one.
@@ -49,9 +51,47 @@ class Restriction:
     name: str
     thrust: float
     arrival: Arrival
+    least_thrust: float = 1.0
     clearance: float = 0.0
     gate: float = 0.0
     terminal: float = 0.0
+
+    def engine(self, lander: Lander) -> Lander:
+        """The vehicle with the thrusts that the class may come to have."""
+        greatest = lander.max_thrust * self.thrust
+        least = min(lander.min_thrust * self.least_thrust, greatest)
+        return replace(lander, max_thrust=greatest, min_thrust=least)
+
+
+@dataclass(frozen=True, eq=False)
+class PlaceLosses:
+    """What no landing of a class undercuts, for every place that it may land on.
+
+    Attributes:
+        places: [m] shape (n, 2).
+        losses: [%] of the propellant, shape (n,).
+    """
+
+    places: Array
+    losses: Array
+
+    @property
+    def least(self) -> float:
+        """[%] least of all; a whole tank where there is no place."""
+        return float(self.losses.min(initial=FAILURE))
+
+
+@dataclass(frozen=True)
+class PenalisedBound:
+    """The first bound, penalised by what knowing the tile is worth.
+
+    Attributes:
+        loss: [%] the least, with the penalty.
+        log_odds: of the true tile after the first look, natural logarithm.
+    """
+
+    loss: float
+    log_odds: float
 
 
 def list_restrictions(preset: Preset) -> tuple[Restriction, ...]:
@@ -62,7 +102,10 @@ def list_restrictions(preset: Preset) -> tuple[Restriction, ...]:
     """
     if preset.stance is not None:
         raise ValueError(f"preset: flights must end on the target plane; those of {preset.name!r} do not")
-    soft, strong = preset.rules.soft_speed, 1.0 + preset.rules.thrust_error
+    if preset.body is not None:
+        raise ValueError(f"preset: a point mass must fly; on {preset.name!r} a rigid body does")
+    soft, error = preset.rules.soft_speed, preset.rules.thrust_error
+    strong = 1.0 + error
     anywhere = Arrival(half_cell=0.5)
     moving = replace(anywhere, most_descent=soft, most_drift=soft)
     options = PlannedDescent().options_for(view_of_preset(preset, np.zeros(3)))
@@ -78,8 +121,8 @@ def list_restrictions(preset: Preset) -> tuple[Restriction, ...]:
         terminal=(gravity + options.terminal_deceleration) * seconds,
     )
     return (
-        Restriction("every policy", strong, moving),
-        Restriction("touchdown at rest", strong, anywhere),
+        Restriction("every policy", strong, moving, 1.0 - error),
+        Restriction("touchdown at rest", strong, anywhere, 1.0 - error),
         Restriction("the engine as specified", 1.0, anywhere),
         Restriction("a margin of thrust", weak, anywhere),
         gently,
@@ -117,13 +160,13 @@ def bound_episode(study: Study, episode: int) -> FloorRow:
     scenario = sample_scenario(study.preset, study.study_seed, episode, study.split)
     restrictions = list_restrictions(study.preset)
     found = [bound_losses(scenario, each) for each in restrictions]
-    floors = tuple(float(losses.min(initial=FAILURE)) for _, losses in found)
-    penalised, odds = math.nan, math.nan
+    penalised = PenalisedBound(math.nan, math.nan)
     if can_recognise(scenario):
-        penalised, odds = penalise(scenario, *found[0])
-    places, losses = found[-1]
-    in_view = bool(losses.size and lies_in_view(scenario, places[int(losses.argmin())]))
-    return FloorRow(scenario.tile.number, floors, in_view, penalised, odds)
+        penalised = penalise(scenario, found[0])
+    last = found[-1]
+    in_view = bool(last.losses.size) and lies_in_view(scenario, last.places[int(last.losses.argmin())])
+    floors = tuple(each.least for each in found)
+    return FloorRow(scenario.tile.number, floors, in_view, penalised.loss, penalised.log_odds)
 
 
 def safe_places(scenario: Scenario, restriction: Restriction) -> Array:
@@ -146,32 +189,33 @@ def lies_in_view(scenario: Scenario, place: Array) -> bool:
     return inside and math.hypot(*(place - position[:2])) <= reach
 
 
-def bound_losses(scenario: Scenario, restriction: Restriction) -> tuple[Array, Array]:
-    """Places that a class may land on [m], shape (n, 2), and the loss [%] that none to each undercuts."""
+def bound_losses(scenario: Scenario, restriction: Restriction) -> PlaceLosses:
+    """What no landing of a class undercuts, place by place."""
     places = safe_places(scenario, restriction)
     preset, state = scenario.preset, scenario.initial_state
     if len(places) == 0:
-        return places, np.empty(0)
-    lander = replace(preset.lander, max_thrust=preset.lander.max_thrust * restriction.thrust)
+        return PlaceLosses(places, np.empty(0))
+    lander = restriction.engine(preset.lander)
     height = float(scenario.nominal_target[2]) + restriction.gate
     spent = bound_cheapest(state, places, lander, np.array(preset.gravity), height, restriction.arrival)
     burnt = state.mass * -np.expm1(-(spent + restriction.terminal) / lander.exhaust_velocity)
-    return places, np.clip(100.0 * burnt / (state.mass - lander.dry_mass), 0.0, FAILURE)
+    losses = np.clip(100.0 * burnt / (state.mass - lander.dry_mass), 0.0, FAILURE)
+    return PlaceLosses(places, losses)
 
 
-def penalise(scenario: Scenario, places: Array, losses: Array) -> tuple[float, float]:
-    """The least loss [%] with the penalty for knowing the tile, and the log-odds of the true tile."""
+def penalise(scenario: Scenario, bounded: PlaceLosses) -> PenalisedBound:
+    """The least loss with the penalty for knowing the tile, of a class that is bounded place by place."""
     candidates = candidate_tiles(scenario)
     tiles = candidates.tiles
     truth = [tile.number for tile in tiles].index(scenario.tile.number)
     likelihood = log_likelihoods(scenario, candidates)
     weights, odds = weigh_tiles(likelihood), log_odds(likelihood, truth)
-    least = float(losses.min(initial=FAILURE))
+    losses, least = bounded.losses, bounded.least
     near = np.flatnonzero(losses <= least + _NEARLY)
     elsewhere = min(least + _NEARLY, FAILURE * float(weights[truth]))  # other safe cells, and unsafe ones
     if near.size == 0:
-        return elsewhere, odds
-    row, column = (places[near][:, axis].astype(int) for axis in (1, 0))
+        return PenalisedBound(elsewhere, odds)
+    row, column = (bounded.places[near][:, axis].astype(int) for axis in (1, 0))
     unsafe = np.array([~tile.deterministic[row, column] for tile in tiles])
     value = losses[near] + FAILURE * unsafe
-    return min(penalised_loss(value, weights, truth, value), elsewhere), odds
+    return PenalisedBound(min(penalised_loss(value, weights, truth, value), elsewhere), odds)

@@ -18,6 +18,8 @@ from hda.policies.composition import PrivilegedComposition
 from hda.policies.hazard_aware import HazardAwareSite
 from hda.policies.waiting_descent import WaitingDescent
 from hda.task.observation import Observation, ScenarioView
+from hda.task.presets import Preset
+from hda.task.scenario import Scenario
 
 
 @dataclass(frozen=True)
@@ -55,6 +57,16 @@ def true_square(tile: Tile, belief: GroundBelief) -> NDArray[np.float32]:
     return out
 
 
+def check_frame(preset: Preset) -> None:
+    """Refuse a preset on which the lander errs about where it is: the map it is told would lie aside.
+
+    Raises:
+        ValueError: it does.
+    """
+    if preset.rules.navigation_position_error or preset.navigation is not None:
+        raise ValueError(f"preset: the lander must know where it is on the map; on {preset.name!r} it errs")
+
+
 def told_name(look: int) -> str:
     """Name in tables of hazard-aware that is told the map at a look."""
     return f"hazard-aware.told-{look}"
@@ -73,9 +85,12 @@ def tell_map(look: int) -> PrivilegedComposition:
     """
     if look < 0:
         raise ValueError(f"look must be at least 0, got {look}")
-    return PrivilegedComposition(
-        told_name(look), lambda scenario: ToldSite(truth=scenario.tile, look=look), WaitingDescent()
-    )
+
+    def select(scenario: Scenario) -> ToldSite:
+        check_frame(scenario.preset)
+        return ToldSite(truth=scenario.tile, look=look)
+
+    return PrivilegedComposition(told_name(look), select, WaitingDescent())
 
 
 def __getattr__(name: str) -> PrivilegedComposition:

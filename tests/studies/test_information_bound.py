@@ -12,12 +12,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import guidance
+from guidance.rigid_body.body import DEFAULT_BODY
 from hda.flight.episode import begin_flight, fly, observe
+from hda.flight.episode_row import summarize_episode
 from hda.policies.beliefs.belief import SafetyBelief
 from hda.policies.privileged.oracle import safe_clearance
 from hda.registry import make_policy
 from hda.sensing.lidar import Lidar, look
 from hda.task.presets import find_preset
+from hda.task.rules import Range, StartConditions
 from hda.task.scenario import sample_scenario
 from studies.campaign.claimed_folder import FolderError
 from studies.campaign.monte_carlo import Study
@@ -29,6 +32,7 @@ from studies.information_bound.recognition import (
     candidate_tiles,
     log_likelihoods,
     log_odds,
+    target_share,
     weigh_tiles,
 )
 from studies.information_bound.restrictions import (
@@ -38,6 +42,7 @@ from studies.information_bound.restrictions import (
     list_restrictions,
     safe_places,
 )
+from studies.information_bound.table import flown_losses
 from studies.information_bound.told import tell_map, told_path, true_square
 
 LANDER, GRAVITY = guidance.PAPER_LANDER, np.array(guidance.MOON_GRAVITY)
@@ -95,12 +100,38 @@ def test_the_cheapest_of_many_cells_is_as_good_as_the_least_of_all_plans() -> No
 def test_every_flight_lies_above_the_bounds_that_hold_for_it() -> None:
     study = plan_study(SMALL)
     names = ("oracle-fuel", "hazard-aware", "nearest-safe")
+    _, resting, *_ = list_restrictions(study.preset)
     for episode in range(3):
         floors = bound_episode(study, episode).floors
         assert all(before <= after + 0.01 for before, after in pairwise(floors))
-        for name in names:
-            outcome = fly(make_policy(name), sample_scenario("paper", 0, episode)).outcome
-            assert not outcome.success or 100.0 * outcome.propellant_fraction >= floors[0]
+        scenario = sample_scenario("paper", 0, episode)
+        flights = [fly(make_policy(name), scenario) for name in names]
+        losses = flown_losses([summarize_episode(flight) for flight in flights])
+        assert (losses >= floors[0]).all()
+        for flight, loss in zip(flights, losses, strict=True):
+            assert flight.outcome.success  # so that the loss is what it burnt
+            east, north, up = flight.velocity[-1]
+            ends = Arrival(-up, -up, math.hypot(east, north), resting.arrival.half_cell)
+            assert loss >= bound_losses(scenario, replace(resting, arrival=ends)).least
+
+
+def test_a_strong_or_weak_engine_flies_above_the_bounds_of_flights() -> None:
+    """An engine that errs downward gives less than the least thrust of its specification, and burns less."""
+    preset = find_preset("paper")
+    lander = replace(preset.lander, min_thrust=3000.0)
+    preset = replace(preset, lander=lander, rules=replace(preset.rules, thrust_error=0.3))
+    scenario = sample_scenario(preset, 0, 1)
+    _, resting, specified, *_ = list_restrictions(preset)
+    weak = replace(lander, max_thrust=1.3 * lander.max_thrust, min_thrust=0.7 * 3000.0)
+    assert resting.engine(lander) == weak
+    assert specified.engine(lander) == lander
+    bounded = bound_losses(scenario, resting)
+    place = bounded.places[int(bounded.losses.argmin())]
+    end = np.array([*place, scenario.nominal_target[2]])
+    plan = guidance.solve_pdg(scenario.initial_state, end, lander=weak, gravity=preset.gravity)
+    burnt = 100.0 * plan.propellant / (scenario.initial_state.mass - lander.dry_mass)
+    assert bounded.least <= burnt < bounded.least + 0.1
+    assert bound_losses(scenario, replace(resting, least_thrust=1.0)).least > burnt
 
 
 def test_the_class_of_a_bound_says_which_cells_it_lands_on() -> None:
@@ -112,7 +143,7 @@ def test_the_class_of_a_bound_says_which_cells_it_lands_on() -> None:
         row, column = (np.floor(places[:, axis]).astype(int) for axis in (1, 0))
         assert len(places) == (tile.deterministic & (safe_clearance(tile) >= each.clearance)).sum()
         assert (safe_clearance(tile)[row, column] >= each.clearance).all()
-        assert len(bound_losses(scenario, each)[1]) == len(places)
+        assert len(bound_losses(scenario, each).losses) == len(places)
 
 
 def test_what_the_first_look_shows_is_what_is_read_in_it() -> None:
@@ -131,6 +162,22 @@ def test_what_the_first_look_shows_is_what_is_read_in_it() -> None:
 def test_a_setting_on_real_ground_is_refused() -> None:
     with pytest.raises(ValueError, match=r"preset: flights must end on the target plane"):
         list_restrictions(find_preset("lidar"))
+
+
+def test_a_rigid_body_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"preset: a point mass must fly; on 'paper' a rigid body does"):
+        list_restrictions(replace(find_preset("paper"), body=DEFAULT_BODY))
+
+
+def test_a_map_is_told_only_where_the_lander_knows_where_it_is() -> None:
+    says = r"preset: the lander must know where it is on the map; on 'partial' it errs"
+    with pytest.raises(ValueError, match=says):
+        plan_study(replace(SMALL, preset="partial"))
+    with pytest.raises(ValueError, match=says):
+        tell_map(0).informed(sample_scenario("partial", 0, 0))
+    navigated = replace(find_preset("paper"), navigation=find_preset("navigated").navigation)
+    with pytest.raises(ValueError, match=r"preset: the lander must know where it is"):
+        tell_map(0).informed(sample_scenario(navigated, 0, 0))
 
 
 def joint_chances(tiles: np.ndarray, right: float) -> tuple[list[tuple[int, ...]], np.ndarray]:
@@ -189,7 +236,15 @@ def test_the_likelihood_of_a_look_is_that_of_its_pixels_one_by_one() -> None:
     seen = observe(scenario, begin_flight(scenario))
     position, target, width = seen.state.position, seen.target, seen.width
     known = candidate_tiles(scenario)
-    for k, tile in enumerate(known.tiles[:3]):
+    likelihoods, centre = log_likelihoods(scenario, known), np.arange(1000) + 0.5
+    about = np.hypot(centre[None, :] - target[0], centre[:, None] - target[1]) <= preset.start.hazard_radius
+    admits = [1.0 - tile.deterministic[about].mean() >= preset.start.hazard_share for tile in known.tiles]
+    assert any(admits)
+    assert not all(admits)
+    for k, tile in enumerate(known.tiles):
+        if not admits[k]:
+            assert likelihoods[k] == -math.inf
+            continue
         total = math.log(known.density[k])
         for i, j in product(range(6), repeat=2):
             x, y = (target[k] + ((n + 0.5) / 6 - 0.5) * width for k, n in ((0, j), (1, i)))
@@ -204,7 +259,24 @@ def test_the_likelihood_of_a_look_is_that_of_its_pixels_one_by_one() -> None:
             else:
                 beyond = (true - 1.0) / sigma if read >= 1.0 else -true / sigma
                 total += math.log(0.5 * math.erfc(-beyond / math.sqrt(2.0)))
-        assert log_likelihoods(scenario, known)[k] in (pytest.approx(total, rel=1e-6), -math.inf)
+        assert likelihoods[k] == pytest.approx(total, rel=1e-6)
+
+
+def test_the_share_of_first_targets_is_that_of_the_area_and_does_not_lean_to_its_edges() -> None:
+    """East of a straight border all is safe: a target's circle may reach beyond it by a fifth of its area."""
+    tile = sample_scenario("paper", 0, 1).tile
+    start = StartConditions(target_area=Range(250.0, 750.0), hazard_radius=100.0, hazard_share=0.8)
+    depth = 0.49186  # of the radius: acos(d) - d sqrt(1 - d^2) = 0.2 pi
+    assert math.acos(depth) - depth * math.sqrt(1.0 - depth**2) == pytest.approx(0.2 * math.pi, abs=2e-5)
+    off = []
+    for border in range(340, 360):  # two periods of the squares, near an edge
+        safe = np.broadcast_to(np.arange(1000) >= border, (1000, 1000)).copy()
+        exact = (border - 100.0 * depth - 250.0) / 500.0
+        off.append(target_share(replace(tile, deterministic=safe), start) - exact)
+    assert max(map(abs, off)) <= 0.5 * 10.0 / 500.0 + 0.002
+    assert abs(np.mean(off)) < 0.002
+    nothing = replace(tile, deterministic=np.ones((1000, 1000), dtype=np.bool_))
+    assert target_share(nothing, start) == 1.0 / 50**2
 
 
 def test_the_first_look_tells_the_tile_and_noise_hides_it() -> None:
