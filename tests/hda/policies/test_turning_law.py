@@ -11,6 +11,7 @@ from guidance.rigid_body import DEFAULT_BODY
 from guidance.rigid_body.attitude_loop import DEFAULT_LOOP
 from guidance.rigid_body.loop_response import fly_turn
 from guidance.tracking.looks_ahead import LooksAhead
+from guidance.tracking.reference import TrackingReference
 from hda.flight.episode import begin_flight, observe
 from hda.policies.hazard_aware import HazardAwareSite
 from hda.policies.planned_descent import PlannedDescent
@@ -62,14 +63,30 @@ def test_with_a_sensor_fixed_to_the_body_a_plan_pays_for_its_looks():
     preset = vary_body(scenario.preset, "body-fixed-sensor")
     fixed = sample_scenario(preset, 3, 0, split="tuning")
     look = observe(scenario, begin_flight(scenario))
+    lidar, rules = preset.lidar, preset.rules
+    own = LooksAhead(rules.decision_interval, lidar.off_nadir_limit, reversal_time(DEFAULT_BODY))
+    free = TurningLaw(replace(TurningLaw().options, looks=replace(own, price=0.0)))
     plain, seeing = (TurningLaw().plan(look, look.target, world.view) for world in (scenario, fixed))
+    indifferent = free.plan(look, look.target, fixed.view)  # looks of one's own are kept
     assert plain is not None
     assert seeing is not None
-    options = replace(TurningLaw().options, looks=LooksAhead(5.0, math.radians(5.7), 8.0, price=0.0))
-    indifferent = TurningLaw(options).plan(look, look.target, scenario.view)
     assert indifferent is not None
-    cost = [float(np.linalg.norm(plan.thrust_acceleration, axis=1).sum()) for plan in (indifferent, seeing)]
-    assert cost[1] > cost[0] * (1.0 - 1e-9)  # of the same flights, the cheapest and one that sees
+
+    def cost(plan: TrackingReference) -> float:
+        return float(np.linalg.norm(plan.thrust_acceleration, axis=1).sum())
+
+    def off(plan: TrackingReference) -> float:
+        """[rad] sum of the angles of site and axis at the looks to come."""
+        each, nodes = round(own.interval / plan.control_period), len(plan.thrust_acceleration)
+        late = round(own.least_time / plan.control_period)
+        picked = slice(each, nodes - late, each)
+        sight, thrust = plan.position[picked] - look.target, plan.thrust_acceleration[picked]
+        lengths = np.linalg.norm(sight, axis=1) * np.linalg.norm(thrust, axis=1)
+        return float(np.arccos(np.clip((sight * thrust).sum(axis=1) / lengths, -1.0, 1.0)).sum())
+
+    assert off(seeing) < 0.9 * off(indifferent)
+    assert off(seeing) < 0.9 * off(plain)
+    assert cost(seeing) > 1.001 * cost(indifferent)  # of the same flights, the cheapest and one that sees
 
 
 def test_a_site_is_kept_when_a_late_divert_comes_too_late():
