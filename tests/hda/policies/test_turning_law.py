@@ -59,7 +59,7 @@ def test_a_body_is_planned_for_smoothly_and_a_point_mass_as_ever():
 
 
 def test_with_a_sensor_fixed_to_the_body_a_plan_pays_for_its_looks():
-    """An episode in which the cheapest plans miss much of their looks, and one that pays for them does not."""
+    """An episode in which the cheapest plans miss many looks, and one that pays for them does not."""
     scenario = sample_scenario("rigid-body", 3, 3, split="tuning")
     preset = vary_body(scenario.preset, "body-fixed-sensor")
     fixed = sample_scenario(preset, 3, 3, split="tuning")
