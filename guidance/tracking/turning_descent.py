@@ -141,38 +141,62 @@ def plan_turning_descent(
     if down[0] != 0.0 or down[1] != 0.0 or down[2] >= 0.0:
         raise ValueError(f"gravity must point along -z, got {down.tolist()}: turn the frame")
     finite_number("control_period", control_period, above=0.0)
-    last = max(1, round(options.terminal_time / control_period))
-    speed = options.terminal_deceleration * last * control_period
-    up = np.array([0.0, 0.0, 1.0])
-    gate = place + 0.5 * speed * last * control_period * up
-    axis = rotate(state.attitude, up)
-    start = state.position, state.velocity, np.array(_FIRST_THRUSTS)[:, None] * axis + down
-    end = gate, -speed * up, options.terminal_deceleration * up
     longest = max(_SHORTEST, int(options.longest / control_period))
     durations = _DURATIONS if options.looks is None else _DURATIONS // 2
     counts = np.unique(np.round(np.geomspace(_SHORTEST, longest, durations)).astype(int))
-    time = counts * control_period
-    coefficients = _Ends(start, end, time).coefficients()
-    if options.looks is not None:
-        coefficients = bend_flights(coefficients, state.velocity[:2])
-    share = np.linspace(0.0, 1.0, _INSTANTS)
-    thrust = _evaluate(coefficients, share, 2) / time[:, None, None] ** 2 - down
-    size = np.linalg.norm(thrust, axis=-1)
-    used = _used_share(thrust, size, time, state.mass, body, options)
-    height = _evaluate(coefficients[..., 2], share, 0)
-    used = np.where(height.min(axis=0) < gate[2] - _BELOW, np.inf, used)
-    cost = size.mean(axis=0) * time[:, None]
-    payable = body.lander.exhaust_velocity * math.log(max(state.mass / body.lander.dry_mass, 1.0))
-    payable -= (options.terminal_deceleration - down[2]) * last * control_period  # from the gate on
-    cost = np.where((used <= 1.0) & (cost < payable), cost, np.inf)
-    if options.looks is not None:
-        sight = _evaluate(coefficients, share, 0) - place
-        cost += price_missed_looks(sight, thrust, time, last * control_period, options.looks)
+    flights = _Flights(state, place, counts * control_period, control_period, down)
+    coefficients = flights.coefficients(options)
+    cost = flights.cost(coefficients, body, options)
     best = np.unravel_index(int(np.argmin(cost)), cost.shape)
     if not np.isfinite(cost[best]):
         return None
     chosen, count = coefficients[:, best[0], best[1]], int(counts[best[0]])
+    last = flights.last_periods(options)
     return _sample(chosen, count, last, control_period, down, options.terminal_deceleration)
+
+
+@dataclass(frozen=True, eq=False)
+class _Flights:
+    """Flights from a state to the gate above a site, of shape (3,), in n durations [s], shape (n,)."""
+
+    state: RigidState
+    site: Array
+    time: Array
+    control_period: float
+    gravity: Array
+
+    def last_periods(self, options: TurningOptions) -> int:
+        """Control periods from the gate to the ground."""
+        return max(1, round(options.terminal_time / self.control_period))
+
+    def coefficients(self, options: TurningOptions) -> Array:
+        """Of k flights of each duration, with detours where there are looks: shape (6 or 7, n, k, 3)."""
+        last, up, state = self.last_periods(options), np.array([0.0, 0.0, 1.0]), self.state
+        speed = options.terminal_deceleration * last * self.control_period
+        gate = self.site + 0.5 * speed * last * self.control_period * up
+        axis = rotate(state.attitude, up)
+        start = state.position, state.velocity, np.array(_FIRST_THRUSTS)[:, None] * axis + self.gravity
+        end = gate, -speed * up, options.terminal_deceleration * up
+        straight = _Ends(start, end, self.time).coefficients()
+        return straight if options.looks is None else bend_flights(straight, state.velocity[:2])
+
+    def cost(self, coefficients: Array, body: RigidBody, options: TurningOptions) -> Array:
+        """[m/s] of each flight, with what its looks miss, shape (n, k); infinite beyond a limit."""
+        share, time, lander = np.linspace(0.0, 1.0, _INSTANTS), self.time, body.lander
+        thrust = _evaluate(coefficients, share, 2) / time[:, None, None] ** 2 - self.gravity
+        size = np.linalg.norm(thrust, axis=-1)
+        used = _used_share(thrust, size, time, self.state.mass, body, options)
+        height = _evaluate(coefficients[..., 2], share, 0)
+        used = np.where(height.min(axis=0) < height[-1] - _BELOW, np.inf, used)
+        cost = size.mean(axis=0) * time[:, None]
+        last = self.last_periods(options)
+        payable = lander.exhaust_velocity * math.log(max(self.state.mass / lander.dry_mass, 1.0))
+        payable -= (options.terminal_deceleration - self.gravity[2]) * last * self.control_period
+        cost = np.where((used <= 1.0) & (cost < payable), cost, np.inf)
+        if options.looks is not None:
+            sight = _evaluate(coefficients, share, 0) - self.site
+            cost += price_missed_looks(sight, thrust, time, last * self.control_period, options.looks)
+        return cost
 
 
 def _used_share(

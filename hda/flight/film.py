@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 _GREYS = 96  # of the palette that all frames share; the colours of lines, and their blends, are the rest
 _BLENDS = 9
 _LAST_FRAME = 2500  # [ms] that the landing stays
+_ROUNDING = 0.005  # [s] of a flight's end as it is told
 
 
 @dataclass(frozen=True)
@@ -42,10 +43,10 @@ class FilmOptions:
     """How a flight is filmed.
 
     Attributes:
-        step: [s] of flight between two frames.
-        speed: seconds of flight that a second of the film shows.
+        step: [s] of flight between two frames; of no account for a still.
+        speed: seconds of flight that a second of the film shows; of no account for a still.
         width: [pixel] of the film; its height is in proportion.
-        at: [s] a still of this moment of the flight, as a PNG, in place of the film.
+        at: [s] a still of this moment of the flight, as a PNG, in place of the film; no later than its end.
     """
 
     step: float = 0.5
@@ -92,7 +93,11 @@ class FilmedEpisode:
 
 
 def film_frames(record: EpisodeRecord, options: FilmOptions) -> Iterator[Image]:
-    """Frames of the film of a flight, from start to touchdown, as RGB images; or the one of a still."""
+    """Frames of the film of a flight, from start to touchdown, as RGB images; or the one of a still.
+
+    Raises:
+        ValueError: the flight ends before the still's moment.
+    """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from PIL import Image
 
@@ -105,10 +110,18 @@ def film_frames(record: EpisodeRecord, options: FilmOptions) -> Iterator[Image]:
 
 
 def frame_times(record: EpisodeRecord, options: FilmOptions) -> Array:
-    """[s] time of flight that each frame shows; the last is the touchdown, unless it is a still's."""
-    if options.at is not None:
-        return np.array([options.at])
+    """[s] time of flight that each frame shows; the last is the touchdown, unless it is a still's.
+
+    Raises:
+        ValueError: the flight ends before the still's moment.
+    """
     end = float(record.time[-1])
+    if options.at is not None:
+        if options.at > end + _ROUNDING:
+            raise ValueError(
+                f"at must lie within the flight, which ends after {end:.2f} s, got {options.at:g}"
+            )
+        return np.array([min(options.at, end)])
     return np.append(np.arange(float(record.time[0]), end, options.step), end)
 
 
@@ -116,7 +129,7 @@ def save_frames(path: Path, frames: Sequence[Image], options: FilmOptions) -> No
     """Write frames as a GIF that repeats for ever, whose last stays for a while; a still as a PNG.
 
     Args:
-        path: of the GIF; its folder is made.
+        path: of the GIF, or of a still's PNG; its folder is made.
         frames: RGB images of one size.
         options: how the flight was filmed.
 

@@ -77,15 +77,13 @@ class FlightErrors:
         navigation: estimated minus true position [m] and velocity [m/s], shape (6,); the vehicle steers by
             the estimate.
         sensing: a filter that goes on estimating during the interval, from the given error on; its memory is
-            changed. None: the error stays.
-        tilt: [rad] shape (3,), true minus believed attitude of a rigid body, a small rotation about the
-            site's axes; with a filter it is that of `sensing`, which drifts with a gyroscope.
+            changed, and a rigid body believes its attitude with the tilt of its true errors. None: the error
+            stays, and a rigid body knows its attitude.
     """
 
     thrust: float = 0.0
     navigation: Array = field(default_factory=lambda: np.zeros(6))
     sensing: Sensing | None = None
-    tilt: Array = field(default_factory=lambda: np.zeros(3))
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,7 +155,7 @@ def fly_over(
     footing = None if ground is None else plain_footing(ground)
     sensing = None if errors.sensing is None else plain_sensing(errors.sensing)
     believed = errors.navigation.copy()
-    tilt = errors.tilt if errors.sensing is None else errors.sensing.errors.tilt
+    tilt = np.zeros(3) if errors.sensing is None else errors.sensing.errors.tilt
     turning = _begin_turning(state, vehicle, interval, gravity, tilt, command)
     conditions = (interval.period, plane, gravity, limits, errors.thrust, believed, footing, turning)
     point = state.point if isinstance(state, RigidState) else state

@@ -57,13 +57,15 @@ def err_rates_into(
 ) -> None:
     """Write by how much the lander misjudges its rates over one control period, [rad/s] shape (3,).
 
-    The noise is held over the period, with the variance that white noise leaves in the angle at its end.
+    The noise is held over the period, with the variance that white noise leaves in the angle at its end. A
+    flight that ends within the period has the same rates; its angle then errs by less than the filter reckons
+    with, by the factor of the time over the period in the variance.
 
     Args:
         memory: of the filter.
         errors: the gyroscope's true bias.
         draws: shape (6,), standard normal.
-        period: [s].
+        period: [s] of a whole control period, also where the flight ends within it.
         numbers: the gyroscope.
         out: written; believed minus true rates, body frame.
     """

@@ -73,7 +73,7 @@ class TurningPath(NamedTuple):
         attitude: true unit quaternions, shape (n, 4).
         draws: shape (n - 1, 6) at least, standard normal.
         numbers: the gyroscope.
-        period: [s] of a whole control period.
+        period: [s] of a whole control period: the noise of the rates in a shorter last one is the same.
     """
 
     attitude: Array

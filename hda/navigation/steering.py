@@ -41,7 +41,9 @@ class Sensing(NamedTuple):
 
     Attributes:
         memory: changed in place.
-        errors: the sensors' true errors; the accelerometer's bias is changed in place.
+        errors: the sensors' true errors; the accelerometer's bias is changed in place, with a gyroscope also
+            the gyroscope's and the tilt. The body that turns holds the same array of the tilt
+            (`hda.flight.rigid.turning`): it drifts there, and is corrected here.
         normal: shape (n, 16), draws of the interval's control periods.
         uniform: shape (n, 3).
         numbers: sensors and filter.

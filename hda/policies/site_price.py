@@ -85,7 +85,9 @@ def predict_next_look(
     """Coast for one decision interval; a sensor fixed to a body sees ground about its easiest landing.
 
     Steadily braked, the lander stops v t / 2 from where it is. Such a flight leans little, its axis points
-    to about there all the way. To land elsewhere it leans, and its sensor looks elsewhere.
+    to about there all the way. To land elsewhere it leans, and its sensor looks elsewhere. The ground that
+    is seen is taken as the circle of a sensor straight above that point, which lies up to 150 m off the
+    nadir; the true one is an ellipse, longer along the way.
     """
     interval, state = view.decision_interval, observation.state
     position = state.position + interval * (state.velocity + 0.5 * interval * view.gravity)

@@ -28,7 +28,8 @@ class TurningLaw:
     """Plans and feedback for a rigid body.
 
     Attributes:
-        options: how descents are planned; a sensor that is fixed to the body adds its looks.
+        options: how descents are planned. Where they have no looks, a sensor that is fixed to the body adds
+            its own.
         upward: weights of the feedback along the vertical, which the throttle answers.
         across: weights across it, which the body answers some seconds later.
         lead: [s] by which the body points ahead of its plan: about what its turn takes.
@@ -49,7 +50,7 @@ class TurningLaw:
         seen = observation.state
         state = RigidState(seen.position, seen.velocity, seen.mass, observation.attitude)
         options = self.options
-        if is_fixed(view.lidar):
+        if options.looks is None and is_fixed(view.lidar):
             half_angle, least = view.lidar.off_nadir_limit, reversal_time(view.body)
             options = replace(options, looks=LooksAhead(view.decision_interval, half_angle, least))
         return plan_turning_descent(state, site, view.body, view.control_period, options, view.gravity)

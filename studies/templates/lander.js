@@ -6,7 +6,8 @@
 
   // Turns the engine's vectors into the site frame: a unit quaternion, of which the page holds the vector part.
   function turner(data, k) {
-    const [x, y, z] = data.attitude.map((part) => part[k]), w = Math.sqrt(Math.max(0, 1 - x * x - y * y - z * z));
+    const written = data.attitude.map((part) => part[k]), length = Math.max(1, Math.hypot(...written));  // rounding may lead above 1
+    const [x, y, z] = written.map((part) => part / length), w = Math.sqrt(Math.max(0, 1 - x * x - y * y - z * z));
     return ([a, b, c]) => {
       const along = x * a + y * b + z * c, size = w * w - x * x - y * y - z * z;
       return [size * a + 2 * (along * x + w * (y * c - z * b)), size * b + 2 * (along * y + w * (z * a - x * c)), size * c + 2 * (along * z + w * (x * b - y * a))];
@@ -23,14 +24,14 @@
     const { x, y, z } = lander.plume, [u, v, w] = lander.nozzle;
     return columns(x.map((_, k) => sum(nozzle, turn([x[k] - u, y[k] - v, throttle * (z[k] - w)]))));
   }
-  // The edge of the sensor's cone on the target plane, as far as the shown ground goes.
+  // The edge of the sensor's cone on the target plane, as far as the shown ground goes; none from below it.
   function rim(turn, place, plane, ends) {
     const across = Math.sin(lander.reach), along = -Math.cos(lander.reach), points = [];
     for (let k = 0; k < rimRays; k++) {
       const angle = 2 * Math.PI * k / (rimRays - 1);
       const seen = turn([across * Math.cos(angle), across * Math.sin(angle), along]);
       const reach = (plane - place[2]) / seen[2], point = [place[0] + reach * seen[0], place[1] + reach * seen[1], plane + 1];
-      const inside = seen[2] < 0 && point.every((value, axis) => axis === 2 || (value >= ends[axis][0] && value <= ends[axis][1]));
+      const inside = place[2] > plane && seen[2] < 0 && point.every((value, axis) => axis === 2 || (value >= ends[axis][0] && value <= ends[axis][1]));
       points.push(inside ? point : null);
     }
     return columns(points);
@@ -54,7 +55,7 @@
   }
   function thrustAt(data, k) { return k < data.thrust.length ? data.thrust[k] : 0; }
   function describe(data, k) {
-    const axis = turner(data, k)([0, 0, 1]), lean = (Math.acos(Math.min(1, axis[2])) * 180 / Math.PI).toFixed(0) + " deg";
+    const axis = turner(data, k)([0, 0, 1]), lean = (Math.acos(Math.max(-1, Math.min(1, axis[2]))) * 180 / Math.PI).toFixed(0) + " deg";
     const thrust = thrustAt(data, k), text = data.time[k] + " s: " + thrust + " N";
     if (lander.rigid) return text + ", leans " + lean;
     return text + (thrust > 0 ? ", " + lean + " aside" : "");

@@ -1,4 +1,4 @@
-"""Flights whose bytes are kept: those of presets without a body, which no work on bodies may move.
+"""Flights whose bytes are kept, of five presets without a body (`PRESETS`): no work on bodies may move them.
 
 `PYTHONPATH=. python tests/studies/flown_bytes.py` flies them and writes flown_bytes.json anew. That belongs
 to a change that moves flights on purpose, and the change log says so.

@@ -106,9 +106,14 @@ def draw_close(axis: Axes, pose: LanderPose, scenario: Scenario, site: Array) ->
 
 
 def draw_reach(axis: Axes, pose: LanderPose, scenario: Scenario) -> None:
-    """Draw the edge of what the sensor can see of the target plane now, on a picture of the ground."""
+    """Draw the edge of what the sensor can see of the target plane now, on a picture of the ground.
+
+    On the plane and below it there is nothing to draw: the cone would meet it behind the sensor.
+    """
     down, limit = _sensor(pose, scenario)
     height = pose.position[2] - scenario.nominal_target[2]
+    if height <= 0.0:
+        return
     rim = cone_rim(down, limit, 90)
     with np.errstate(divide="ignore", invalid="ignore"):
         reach = np.where(rim[:, 2] < 0.0, -height / rim[:, 2], np.nan)

@@ -3,8 +3,8 @@
 `turning` is the body under way, with what it believes of its attitude; `pointing` says where it points, for
 both laws; `held_command` flies a commanded thrust over a control period, or the fall after the cut-off, to
 the plane, the ground or the empty tank. The laws of `hda.flight.interval` call it as they call the point
-mass. It imports the body of `guidance.rigid_body`, the stance and the attitude of `hda.navigation`, nothing
-else of the simulator.
+mass. It imports the body of `guidance.rigid_body`, the stance of `hda.safety`, and of `hda.navigation` the
+filter's kernels; nothing else of the simulator.
 """
 
 from typing import TYPE_CHECKING

@@ -77,7 +77,8 @@ def begin_turning(
         state: where it starts.
         body: the vehicle.
         loop: the gains.
-        tilt: [rad] shape (3,), true minus believed attitude; a gyroscope's drift changes it.
+        tilt: [rad] shape (3,), true minus believed attitude. It is held, not copied: with a filter it is the
+            array of `Sensing.errors`, where a gyroscope's drift and the filter's corrections change it.
         lead: [s] by which it points ahead of a plan.
         nodes: of the path.
     """

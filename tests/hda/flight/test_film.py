@@ -40,6 +40,14 @@ def test_a_film_plays_the_flight_at_its_speed(record: EpisodeRecord, tmp_path: P
     assert shown == pytest.approx(500 * (len(times) - 1) + 2500)
 
 
+def test_a_still_lies_within_the_flight(record: EpisodeRecord) -> None:
+    end = float(record.time[-1])
+    assert frame_times(record, FilmOptions(at=end)).tolist() == [end]
+    assert frame_times(record, FilmOptions(at=end + 0.004)).tolist() == [end]  # as its end is written
+    with pytest.raises(ValueError, match=f"at must lie within the flight, which ends after {end:.2f} s"):
+        frame_times(record, FilmOptions(at=end + 0.1))
+
+
 def test_the_command_films_an_agent_and_keeps_under_its_size(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

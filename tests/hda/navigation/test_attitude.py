@@ -241,6 +241,26 @@ def test_a_path_without_attitudes_is_refused_where_there_is_a_gyroscope():
         navigate(SYSTEM, start, (time, path, np.ones(2), np.tile(UPRIGHT, (2, 1))), draws)
 
 
+@pytest.mark.parametrize(("begun", "taken_on"), [(ALONE, SYSTEM), (SYSTEM, ALONE)])
+def test_a_filter_of_a_system_with_other_rows_is_refused(begun: NavigationSystem, taken_on: NavigationSystem):
+    state = State(np.array([0.0, 0.0, 500.0]), np.zeros(3), 1200.0)
+    start = begin_navigation(begun, state, TARGET, draw_sensor_errors(begun, np.random.default_rng(0)))
+    time, path = 0.5 * np.arange(3, dtype=np.float64), np.tile(state.as_array(), (3, 1))
+    draws = draw_readings(np.random.default_rng(0), 2, gyroscope=True)
+    with pytest.raises(ValueError, match=r"navigation must be of a system with(out)? a gyroscope"):
+        navigate(taken_on, start, (time, path, np.ones(2), np.tile(UPRIGHT, (3, 1))), draws)
+
+
+@pytest.mark.parametrize("shape", [(1, 6), (2, 5), (12,)])
+def test_draws_of_a_gyroscope_that_do_not_fit_are_refused(shape: tuple[int, ...]):
+    state = State(np.array([0.0, 0.0, 500.0]), np.zeros(3), 1200.0)
+    start = begin_navigation(SYSTEM, state, TARGET, draw_sensor_errors(SYSTEM, np.random.default_rng(0)))
+    time, path = 0.5 * np.arange(3, dtype=np.float64), np.tile(state.as_array(), (3, 1))
+    draws = replace(draw_readings(np.random.default_rng(0), 2), gyro=np.zeros(shape))
+    with pytest.raises(ValueError, match="gyro must have shape"):
+        navigate(SYSTEM, start, (time, path, np.ones(2), np.tile(UPRIGHT, (3, 1))), draws)
+
+
 @pytest.mark.parametrize("name", ["noise", "bias", "correlation_time"])
 def test_a_gyroscope_that_cannot_be_is_refused(name: str):
     with pytest.raises(ValueError, match=name):

@@ -11,6 +11,7 @@ from guidance.rigid_body import DEFAULT_BODY
 from guidance.rigid_body.attitude_loop import DEFAULT_LOOP
 from guidance.rigid_body.loop_response import fly_turn
 from guidance.tracking.looks_ahead import LooksAhead
+from guidance.tracking.reference import TrackingReference
 from hda.flight.episode import begin_flight, observe
 from hda.policies.hazard_aware import HazardAwareSite
 from hda.policies.planned_descent import PlannedDescent
@@ -58,18 +59,34 @@ def test_a_body_is_planned_for_smoothly_and_a_point_mass_as_ever():
 
 
 def test_with_a_sensor_fixed_to_the_body_a_plan_pays_for_its_looks():
-    scenario = sample_scenario("rigid-body", 3, 0, split="tuning")
+    """An episode in which the cheapest plans miss many looks, and one that pays for them does not."""
+    scenario = sample_scenario("rigid-body", 3, 3, split="tuning")
     preset = vary_body(scenario.preset, "body-fixed-sensor")
-    fixed = sample_scenario(preset, 3, 0, split="tuning")
+    fixed = sample_scenario(preset, 3, 3, split="tuning")
     look = observe(scenario, begin_flight(scenario))
+    lidar, rules = preset.lidar, preset.rules
+    own = LooksAhead(rules.decision_interval, lidar.off_nadir_limit, reversal_time(DEFAULT_BODY))
+    free = TurningLaw(replace(TurningLaw().options, looks=replace(own, price=0.0)))
     plain, seeing = (TurningLaw().plan(look, look.target, world.view) for world in (scenario, fixed))
+    indifferent = free.plan(look, look.target, fixed.view)  # looks of one's own are kept
     assert plain is not None
     assert seeing is not None
-    options = replace(TurningLaw().options, looks=LooksAhead(5.0, math.radians(5.7), 8.0, price=0.0))
-    indifferent = TurningLaw(options).plan(look, look.target, scenario.view)
     assert indifferent is not None
-    cost = [float(np.linalg.norm(plan.thrust_acceleration, axis=1).sum()) for plan in (indifferent, seeing)]
-    assert cost[1] > cost[0] * (1.0 - 1e-9)  # of the same flights, the cheapest and one that sees
+
+    def cost(plan: TrackingReference) -> float:
+        return float(np.linalg.norm(plan.thrust_acceleration, axis=1).sum())
+
+    def missed(plan: TrackingReference) -> float:
+        """Looks to come, each by the angle of site and axis over the whole field of view, 1 beyond it."""
+        each, nodes = round(own.interval / plan.control_period), len(plan.thrust_acceleration)
+        picked = slice(each, nodes - round(own.least_time / plan.control_period), each)
+        sight, thrust = plan.position[picked] - look.target, plan.thrust_acceleration[picked]
+        lengths = np.linalg.norm(sight, axis=1) * np.linalg.norm(thrust, axis=1)
+        angle = np.arccos(np.clip((sight * thrust).sum(axis=1) / lengths, -1.0, 1.0))
+        return float(np.minimum(angle / (2.0 * own.half_angle), 1.0).sum())
+
+    assert missed(seeing) < 0.6 * min(missed(indifferent), missed(plain))
+    assert cost(seeing) > cost(indifferent)  # of the same flights, the cheapest and one that sees
 
 
 def test_a_site_is_kept_when_a_late_divert_comes_too_late():

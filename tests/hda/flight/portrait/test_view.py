@@ -124,6 +124,13 @@ def test_a_cone_that_looks_past_the_horizon_has_a_gap(scenario: Scenario):
     assert 0 < np.isnan(east).sum() < len(east)
 
 
+@pytest.mark.parametrize("height", [0.0, -0.5])
+def test_on_the_plane_and_below_it_no_reach_is_drawn(scenario: Scenario, height: float):
+    axis = Figure().subplots()
+    draw_reach(axis, pose_of(scenario, (0.2, 0.1), height), scenario)
+    assert not axis.lines
+
+
 def test_close_by_the_line_leads_to_the_target_and_the_cone_hangs_from_the_lander(scenario: Scenario):
     pose, view = pose_of(scenario, (0.2, 0.1), 200.0), view_beside(scenario)
     axis = Figure().subplots()

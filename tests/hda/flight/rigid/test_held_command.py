@@ -9,13 +9,19 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from guidance import MOON_GRAVITY, Lander
+from guidance.arrays import Array
 from guidance.rigid_body import AttitudeLoop, RigidBody, RigidState
 from guidance.rigid_body.quaternion import tilt_angle
 from guidance.tracking.reference import make_reference
 from hda.flight.rigid import believed_attitude
 from hda.flight.vehicle import ControlPeriods, FlightErrors, FlightStatus, Segment, Surroundings, fly_over
+from hda.navigation.layout import NORMAL_COLUMNS, UNIFORM_COLUMNS
+from hda.navigation.navigation_state import begin_navigation
+from hda.navigation.sensor_errors import SensorErrors
+from hda.navigation.steering import Sensing
 from hda.policy import Decision, PlanCommand, ZemZevCommand
 from hda.safety.touchdown_stance import Stance, contact_height, make_footing
+from tests.hda.navigation.filter_cases import ALONE
 
 GRAVITY = np.array(MOON_GRAVITY)
 PULL = 1.62
@@ -147,10 +153,27 @@ def test_the_true_attitude_is_the_believed_one_turned_by_the_tilt(turn, tilt):
     np.testing.assert_allclose(between, tilt, atol=1e-8)
 
 
+def leant_unit(state: RigidState, tilt: Array) -> Sensing:
+    """A filter that has an inertial unit alone, whose only error is a tilt."""
+    errors = SensorErrors(np.zeros(3), 0.0, np.zeros(3), tilt, np.zeros(3), np.zeros(3))
+    navigation = begin_navigation(ALONE, state.point, SITE, errors)
+    return Sensing(
+        navigation.memory(),
+        errors.true_errors(),
+        np.zeros((INTERVAL.count, NORMAL_COLUMNS)),
+        np.zeros((INTERVAL.count, UNIFORM_COLUMNS)),
+        ALONE.numbers(INTERVAL.period),
+        elevation=np.full((64, 64), PLANE, dtype=np.float32),
+        top=PLANE,
+        site=SITE,
+        instant=0,
+    )
+
+
 def test_a_tilt_that_it_does_not_know_of_tilts_its_thrust():
-    tilt = np.array([0.0, 0.02, 0.0])
     lifted = standing(600.0, thrust=3000.0)
-    segment = fly(lifted, hold(3000.0, 1200.0), RigidBody(engine_lag=0.0), FlightErrors(tilt=tilt))
+    errors = FlightErrors(sensing=leant_unit(lifted, np.array([0.0, 0.02, 0.0])))
+    segment = fly(lifted, hold(3000.0, 1200.0), RigidBody(engine_lag=0.0), errors)
     assert segment.body_path is not None
     up = Rotation.from_quat(segment.body_path[-1, 6:10], scalar_first=True).apply([0.0, 0.0, 1.0])
     np.testing.assert_allclose(up, [math.sin(0.02), 0.0, math.cos(0.02)], atol=3e-4)
