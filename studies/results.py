@@ -99,7 +99,7 @@ RESULTS: dict[str, Result] = {
         "studies.rare_events --policy hazard-aware --whole 600 --out results/rare_hazard_aware",
     ),
     "rare-causes": Result("rare-events.md", "studies.rare_events --effort 0.5 --out results/rare_causes"),
-    "information-bound": Result("information-bound.md", "studies.information_bound --episodes 100"),
+    "information-bound": Result("information-bound.md", "studies.information_bound"),
     "rigid-plans": Result("../explanation/rigid-body-plans.md", "studies.rigid_plans --starts 1000"),
     "scale": Result("scale.md", "studies.scale --episodes 1000 10000"),
 }
