@@ -228,4 +228,5 @@ def test_minari_reads_it_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     env = rl.LunarHDAEnv()
     assert read.spec.observation_space == env.observation_space
     assert read.spec.action_space == env.action_space
-    assert read.env_spec is not None and read.env_spec.entry_point == "rl.environment.env:LunarHDAEnv"
+    assert read.env_spec is not None
+    assert read.env_spec.entry_point == "rl.environment.env:LunarHDAEnv"
