@@ -104,7 +104,7 @@ def _refuse_members(members: Sequence[zipfile.ZipInfo], most_bytes: int) -> None
 
 def _read_member(file: zipfile.ZipFile, name: str) -> Any:
     with file.open(f"{name}.npy") as member:
-        return np.lib.format.read_array(member, allow_pickle=False)
+        return np.load(member, allow_pickle=False)
 
 
 def _read_card(member: Any) -> dict[str, Any]:
