@@ -53,7 +53,7 @@ def write_minari(folder: Path, dataset: Dataset, on_done: Callable[[], None] = l
 
     Args:
         folder: root of Minari's datasets.
-        dataset: with the card of `rl.dataset.data_card.describe_dataset`.
+        dataset: with the card that `rl.dataset.data_card.identify_dataset` begins.
         on_done: called after each episode.
 
     Returns:
