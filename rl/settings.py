@@ -30,6 +30,7 @@ class OffPolicySettings:
             (td3 and those with memory).
         random_steps: steps with uniform actions before the first update.
         replay_size: transitions kept.
+        update_every: environment steps for one update.
     """
 
     batch_size: int = 256
@@ -39,6 +40,7 @@ class OffPolicySettings:
     smoothing_noise: float = 0.05
     random_steps: int = 25_000
     replay_size: int = 400_000
+    update_every: int = 1
 
 
 @dataclass(frozen=True)
@@ -48,7 +50,6 @@ class SequenceSettings(OffPolicySettings):
     Attributes:
         hidden: sizes of the layers that join the branches.
         memory: hidden size of each LSTM.
-        update_every: environment steps for one update, which learns from whole sequences.
         window: longest sequence of td3-lstm-plus; longer episodes give windows of that many transitions.
         burn_in: transitions before a window that only fill the memory.
     """
@@ -59,7 +60,6 @@ class SequenceSettings(OffPolicySettings):
     random_steps: int = 20_000
     replay_size: int = 200_000
     memory: int = 128
-    update_every: int = 1
     window: int = 20
     burn_in: int = 0
 

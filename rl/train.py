@@ -15,7 +15,7 @@ from __future__ import annotations
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Union
+from typing import Annotated, Any, Literal, Union
 
 import tyro
 
@@ -54,6 +54,7 @@ class TrainingOptions:
         validate_every: steps between validations.
         validation_episodes: episodes of each validation.
         checkpoint_every: least steps between checkpoints.
+        device: that torch learns on; auto takes a GPU where torch sees one. Episodes fly on the processor.
     """
 
     settings: tyro.conf.OmitArgPrefixes[AgentSettings]
@@ -65,6 +66,7 @@ class TrainingOptions:
     validate_every: int = 10_000
     validation_episodes: int = 200
     checkpoint_every: int = 10_000
+    device: Literal["auto", "cpu", "cuda"] = "auto"
 
 
 @dataclass(frozen=True)
@@ -73,7 +75,7 @@ class TrainAgent(TrainingOptions):
 
     Attributes:
         settings: what is learnt.
-        steps: environment steps, each followed by one update once the random steps are over.
+        steps: environment steps; one update every `update_every` once the random steps are over.
     """
 
     settings: tyro.conf.OmitArgPrefixes[OffPolicyAgentSettings] = OFF_POLICY_RECIPES["td3"]
@@ -155,6 +157,7 @@ def run_agent_training(options: TrainingOptions, name: str) -> None:
     from guidance.validation import finite_number
     from hda.ground.library import Ground, prepare_tiles
     from hda.task.presets import find_preset
+    from rl.learning.device import choose_device
     from rl.training.run import run_training
     from rl.training.run_folder import TrainingPlan
 
@@ -173,7 +176,7 @@ def run_agent_training(options: TrainingOptions, name: str) -> None:
         options.checkpoint_every,
     )
     folder = options.out or Path("runs") / f"{name}-{options.seed}"
-    run_training(folder, preset, options.settings, plan, options.resume)
+    run_training(folder, preset, options.settings, plan, options.resume, choose_device(options.device))
 
 
 def main() -> None:

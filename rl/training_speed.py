@@ -12,7 +12,7 @@ import sys
 import time as clock
 import warnings
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import tyro
@@ -33,6 +33,7 @@ class TrainingSpeed:
         sequences: per update of an agent with memory.
         length: transitions in each.
         memory: hidden size of its LSTMs.
+        device: that torch learns on; auto takes a GPU where torch sees one.
         profile: print what the update of td3-lstm spends its time on, and how many this core can make.
     """
 
@@ -43,6 +44,7 @@ class TrainingSpeed:
     sequences: int = 100
     length: int = 10
     memory: int = 128
+    device: Literal["auto", "cpu", "cuda"] = "cpu"
     profile: bool = False
 
 
@@ -61,6 +63,7 @@ class UpdateRate:
 
 def _filled(kind: Any, options: TrainingSpeed, fused: bool) -> Any:
     from rl.environment.env import LunarHDAEnv
+    from rl.learning.device import choose_device
 
     extra = {"optimizer_kwargs": {"fused": True}} if fused else {}
     model = kind(
@@ -68,7 +71,7 @@ def _filled(kind: Any, options: TrainingSpeed, fused: bool) -> Any:
         LunarHDAEnv(),
         seed=0,
         buffer_size=10_000,
-        device="cpu",
+        device=choose_device(options.device),
         policy_kwargs={"net_arch": list(options.hidden), **extra},
     )
     model._setup_learn(1, None)
@@ -113,11 +116,12 @@ def _filled_with_sequences(name: str, options: TrainingSpeed) -> Any:
 
     from rl.environment.env import LunarHDAEnv
     from rl.learning.algorithms import make_agent_with_memory
+    from rl.learning.device import choose_device
     from rl.learning.recurrent.replay import Episode
     from rl.recipes import RECURRENT_RECIPES
 
     recipe = replace(RECURRENT_RECIPES[name], batch_size=options.sequences, memory=options.memory)
-    agent = make_agent_with_memory(recipe, LunarHDAEnv(), 0)
+    agent = make_agent_with_memory(recipe, LunarHDAEnv(), 0, choose_device(options.device))
     rng, length = np.random.default_rng(0), options.length
     for _ in range(2 * options.sequences):
         observations = rng.uniform(-1.0, 1.0, (length + 1, agent.sizes.observation))

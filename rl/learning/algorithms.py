@@ -24,14 +24,16 @@ if TYPE_CHECKING:
     from rl.learning.recurrent.td3_lstm import RecurrentTD3
 
 
-def make_agent_with_memory(settings: RecurrentSettings, env: Any, seed: int) -> RecurrentTD3:
-    """Make an untrained agent with memory."""
+def make_agent_with_memory(
+    settings: RecurrentSettings, env: Any, seed: int, device: str = "cpu"
+) -> RecurrentTD3:
+    """Make an untrained agent with memory; as `make_algorithm`."""
     from rl.learning.recurrent.hyperparameters import Hyperparameters
     from rl.learning.recurrent.td3_lstm import RecurrentTD3
 
     chosen = {field.name: getattr(settings, field.name) for field in fields(SequenceSettings)}
     hyperparameters = Hyperparameters(plus=settings.algorithm == "td3-lstm-plus", **chosen)
-    agent = RecurrentTD3(env, hyperparameters, seed, settings.learning_rate_at)
+    agent = RecurrentTD3(env, hyperparameters, seed, settings.learning_rate_at, device)
 
     def prior_at(step: int) -> Array32:
         weights = np.full(agent.sizes.action, settings.shift_prior_at(step), np.float32)
@@ -48,7 +50,7 @@ def count_controls(settings: AgentSettings) -> int:
 
 
 def make_algorithm(
-    settings: AgentSettings, env: Any, seed: int
+    settings: AgentSettings, env: Any, seed: int, device: str = "cpu"
 ) -> OffPolicyAlgorithm | OnPolicyAlgorithm | RecurrentTD3:
     """Make an untrained algorithm.
 
@@ -56,6 +58,7 @@ def make_algorithm(
         settings: what is learnt.
         env: Gymnasium environment; for what learns from many at a time Stable-Baselines3's `VecEnv`.
         seed: of the first weights, the exploration and the episodes.
+        device: that torch learns on, "cpu" or "cuda".
 
     Raises:
         ValueError: unknown algorithm, or spaces that are not one-dimensional boxes, finite for actions.
@@ -65,15 +68,17 @@ def make_algorithm(
     from rl.learning.ppo import make_on_policy
 
     if isinstance(settings, OnPolicySettings):
-        return make_on_policy(settings, env, seed)
+        return make_on_policy(settings, env, seed, device)
     check_environment(env)
     if isinstance(settings, RecurrentSettings):
-        return make_agent_with_memory(settings, env, seed)
+        return make_agent_with_memory(settings, env, seed, device)
     assert isinstance(settings, OffPolicyAgentSettings)
-    return make_off_policy(settings, env, seed)
+    return make_off_policy(settings, env, seed, device)
 
 
-def make_off_policy(settings: OffPolicyAgentSettings, env: Any, seed: int) -> OffPolicyAlgorithm:
+def make_off_policy(
+    settings: OffPolicyAgentSettings, env: Any, seed: int, device: str = "cpu"
+) -> OffPolicyAlgorithm:
     """Make an untrained agent without memory that learns from a replay memory; as `make_algorithm`."""
     from stable_baselines3 import DDPG, SAC
     from stable_baselines3.common.noise import NormalActionNoise
@@ -96,11 +101,11 @@ def make_off_policy(settings: OffPolicyAgentSettings, env: Any, seed: int) -> Of
         batch_size=settings.batch_size,
         tau=settings.target_rate,
         gamma=settings.discount,
-        train_freq=1,
+        train_freq=settings.update_every,
         gradient_steps=1,
         policy_kwargs={"net_arch": list(settings.hidden), "optimizer_kwargs": {"fused": True}},
         seed=seed,
-        device="cpu",
+        device=device,
     )
     # decays follow the step and not SB3's share of the total, so that a longer run begins as a shorter one
     algorithm.lr_schedule = lambda _: settings.learning_rate_at(algorithm.num_timesteps)

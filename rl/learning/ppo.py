@@ -17,13 +17,14 @@ if TYPE_CHECKING:
     from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 
 
-def make_on_policy(settings: OnPolicySettings, env: Any, seed: int) -> OnPolicyAlgorithm:
+def make_on_policy(settings: OnPolicySettings, env: Any, seed: int, device: str = "cpu") -> OnPolicyAlgorithm:
     """Make it untrained.
 
     Args:
         settings: what is learnt.
         env: Stable-Baselines3's `VecEnv`.
         seed: of the first weights, the exploration and the episodes.
+        device: that torch learns on, "cpu" or "cuda".
 
     Raises:
         ValueError: another algorithm's settings, spaces that are not one-dimensional boxes, finite for
@@ -59,7 +60,7 @@ def make_on_policy(settings: OnPolicySettings, env: Any, seed: int) -> OnPolicyA
         "vf_coef": settings.value_weight,
         "max_grad_norm": settings.greatest_gradient,
         "seed": seed,
-        "device": "cpu",
+        "device": device,
     }
     if isinstance(settings, RecurrentOnPolicySettings):
         from sb3_contrib import RecurrentPPO

@@ -58,7 +58,7 @@ def _lstm_tensors(lstm: nn.LSTM) -> Tensors:
 
 
 def _numbers(values: Tensor) -> NDArray[Any]:
-    return values.detach().contiguous().numpy().copy()
+    return values.detach().cpu().contiguous().numpy().copy()
 
 
 def actor_card(settings: AgentSettings) -> dict[str, Any]:

@@ -68,6 +68,8 @@ def save_checkpoint(folder: Path, algorithm: Algorithm, env: Environment, card: 
         flown = _replay_tensors(algorithm)
     tensors = {**_network_tensors(algorithm), **flown}
     tensors["generator/torch"] = torch.get_rng_state().numpy()
+    if algorithm.device.type == "cuda":
+        tensors["generator/cuda"] = torch.cuda.get_rng_state(algorithm.device).numpy()
     save_artefact(path, KIND, tensors, {**card, "generators": generators, "counters": counters})
     for old in folder.glob("checkpoint-*"):
         if old.stem != path.name:
@@ -124,6 +126,9 @@ def _restore_run(artefact: Artefact, algorithm: Algorithm, env: Environment) -> 
     name, keys, *rest = generators["numpy"]
     np.random.set_state((name, np.array(keys, dtype=np.uint32), *rest))  # noqa: NPY002 - SB3 draws from it
     torch.set_rng_state(torch.from_numpy(artefact.tensors["generator/torch"].copy()))
+    if algorithm.device.type == "cuda" and "generator/cuda" in artefact.tensors:
+        state = torch.from_numpy(artefact.tensors["generator/cuda"].copy())
+        torch.cuda.set_rng_state(state, algorithm.device)
 
 
 def _begin_episode(algorithm: Any) -> None:
@@ -155,11 +160,11 @@ def _network_tensors(algorithm: Algorithm) -> Tensors:
         if "param_groups" in state:  # an optimiser
             for index, moments in state["state"].items():
                 for key, value in moments.items():
-                    tensors[f"{name}/{index}/{key}"] = value.numpy()
+                    tensors[f"{name}/{index}/{key}"] = value.cpu().numpy()
         else:
-            tensors.update({f"{name}/{key}": value.numpy() for key, value in state.items()})
+            tensors.update({f"{name}/{key}": value.cpu().numpy() for key, value in state.items()})
     for name in variables:
-        tensors[f"variable/{name}"] = attrgetter(name)(algorithm).detach().numpy()
+        tensors[f"variable/{name}"] = attrgetter(name)(algorithm).detach().cpu().numpy()
     return tensors
 
 
@@ -219,7 +224,7 @@ def _flight_tensors(algorithm: Any, env: LandingVectorEnv[Any]) -> Tensors:
     tensors["rollout/episode_starts"] = np.asarray(algorithm._last_episode_starts, np.bool_)
     for network, memory in _memories(algorithm).items():
         for name, part in zip(("hidden", "cell"), memory, strict=True):
-            tensors[f"rollout/{network}/{name}"] = part.numpy()
+            tensors[f"rollout/{network}/{name}"] = part.cpu().numpy()
     return tensors
 
 

@@ -28,7 +28,12 @@ from rl.training.run_folder import TrainingPlan, read_run
 
 
 def run_training(
-    folder: Path, preset: Preset, settings: AgentSettings, plan: TrainingPlan, resume: bool
+    folder: Path,
+    preset: Preset,
+    settings: AgentSettings,
+    plan: TrainingPlan,
+    resume: bool,
+    device: str = "cpu",
 ) -> None:
     """Train, or go on training.
 
@@ -38,6 +43,7 @@ def run_training(
         settings: what is learnt.
         plan: how long and how seeded.
         resume: go on from the newest checkpoint in the folder, if there is one.
+        device: that torch learns on, "cpu" or "cuda"; episodes are flown on the processor.
 
     Raises:
         ValueError: the folder holds a run and `resume` is not set, or holds a run with other settings; the
@@ -47,10 +53,12 @@ def run_training(
 
     torch.set_num_threads(1)
     with matmul_precision(settings.matmul_precision):
-        _train(folder, preset, settings, plan, resume)
+        _train(folder, preset, settings, plan, resume, device)
 
 
-def _train(folder: Path, preset: Preset, settings: AgentSettings, plan: TrainingPlan, resume: bool) -> None:
+def _train(
+    folder: Path, preset: Preset, settings: AgentSettings, plan: TrainingPlan, resume: bool, device: str
+) -> None:
     from stable_baselines3.common.logger import Logger, TensorBoardOutputFormat
 
     from rl.training.recorder import Recorder
@@ -60,7 +68,7 @@ def _train(folder: Path, preset: Preset, settings: AgentSettings, plan: Training
     env = make_environment(settings, preset)  # refuses what cannot be learnt before a folder is made
     checkpoint = _open_folder(folder, preset, settings, plan, resume)
     flown = env if isinstance(env, LandingEnv) else StableBaselinesVector(env)
-    algorithm = make_algorithm(settings, flown, plan.seed)
+    algorithm = make_algorithm(settings, flown, plan.seed, device)
     algorithm.set_logger(Logger(str(folder), [TensorBoardOutputFormat(str(folder / "tensorboard"))]))
     columns = (
         TextColumn("{task.description}"),

@@ -49,11 +49,12 @@ class RecurrentAgent:
         settings: hyperparameters.
         sizes: of the networks.
         networks: all four; also by name, as a checkpoint keeps them.
+        device: where the networks are.
         rng: draws the exploration, and whatever a learner draws.
         num_timesteps: environment steps so far.
     """
 
-    def __init__(self, env: Any, settings: Hyperparameters, seed: int) -> None:
+    def __init__(self, env: Any, settings: Hyperparameters, seed: int, device: str = "cpu") -> None:
         """Make it untrained.
 
         Args:
@@ -61,6 +62,7 @@ class RecurrentAgent:
                 actions are finite.
             settings: hyperparameters.
             seed: of weights and exploration.
+            device: of torch, where the networks are.
 
         Raises:
             ValueError: the spaces are not such boxes.
@@ -75,7 +77,8 @@ class RecurrentAgent:
             settings.hidden,
             previous_reward=settings.plus,
         )
-        self.networks = ActorCritic.untrained(self.sizes, settings.plus, seed)
+        self.device = torch.device(device)
+        self.networks = ActorCritic.untrained(self.sizes, settings.plus, seed).to(self.device)
         self.actor, self.critic = self.networks.actor, self.networks.critic
         self.actor_target, self.critic_target = self.networks.actor_target, self.networks.critic_target
         self.rng = np.random.default_rng(seed)
@@ -127,10 +130,13 @@ class RecurrentAgent:
         if self.settings.plus:
             history.append(reward[:, None])
         with torch.no_grad():
-            past = (torch.from_numpy(memory.hidden)[None], torch.from_numpy(memory.cell)[None])
-            entered = torch.from_numpy(np.concatenate(history, 1))[None]
-            inputs, (hidden, cell) = self.actor(torch.from_numpy(seen)[None], entered, past)
-        return np.tanh(inputs[0].numpy()), hidden[0].numpy(), cell[0].numpy()
+            past = (self._tensor(memory.hidden)[None], self._tensor(memory.cell)[None])
+            entered = self._tensor(np.concatenate(history, 1))[None]
+            inputs, (hidden, cell) = self.actor(self._tensor(seen)[None], entered, past)
+        return np.tanh(inputs[0].cpu().numpy()), hidden[0].cpu().numpy(), cell[0].cpu().numpy()
+
+    def _tensor(self, values: Array32) -> torch.Tensor:
+        return torch.from_numpy(values).to(self.device)
 
     def _empty_memory(self, n: int) -> AgentMemory:
         return AgentMemory.empty(n, self.settings.memory, self.action_space.shape[0])

@@ -35,17 +35,16 @@ class SequenceTensors:
     counted: Tensor
 
     @classmethod
-    def of(cls, batch: SequenceBatch, previous_reward: bool) -> SequenceTensors:
-        """From arrays."""
+    def of(
+        cls, batch: SequenceBatch, previous_reward: bool, device: torch.device | str = "cpu"
+    ) -> SequenceTensors:
+        """From arrays, for networks on that device."""
         parts = [batch.observations, batch.previous_actions]
         if previous_reward:
             parts.append(batch.previous_rewards[..., None])
         arrays = (batch.actions, batch.rewards, batch.terminated, batch.counted)
-        return cls(
-            torch.from_numpy(batch.observations),
-            torch.from_numpy(np.concatenate(parts, -1)),
-            *(torch.from_numpy(array) for array in arrays),
-        )
+        every = (batch.observations, np.concatenate(parts, -1), *arrays)
+        return cls(*(torch.from_numpy(array).to(device) for array in every))
 
     def mean(self, values: Tensor) -> Tensor:
         """Mean over the transitions that count; values (T, N)."""
@@ -85,6 +84,12 @@ class ActorCritic:
             target.requires_grad_(False)
         return cls(actor, critic, *targets)
 
+    def to(self, device: torch.device) -> ActorCritic:
+        """The same networks, moved there."""
+        for network in (self.actor, self.critic, self.actor_target, self.critic_target):
+            network.to(device)
+        return self
+
     def follow(self, rate: float) -> None:
         """Move the targets towards the networks by this share of the way."""
         lerp = vars(torch)["_foreach_lerp_"]  # the one call that optimisers use; not in the type stubs
@@ -118,7 +123,7 @@ def critic_loss(
     """
     target = target_values(networks, batch, noise, settings)
     pasts = networks.critic.remember(batch.history[:-1])
-    loss = torch.zeros(())
+    loss = torch.zeros((), device=target.device)
     for value in networks.critic.values(pasts, batch.observations[:-1], batch.actions):
         loss = loss + batch.mean((value - target).square())
     return loss

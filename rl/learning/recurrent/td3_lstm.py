@@ -65,6 +65,7 @@ class RecurrentTD3(RecurrentAgent):
         settings: Hyperparameters,
         seed: int,
         learning_rate: Schedule = lambda step: 1e-3,
+        device: str = "cpu",
     ) -> None:
         """Make it untrained.
 
@@ -74,11 +75,12 @@ class RecurrentTD3(RecurrentAgent):
             settings: hyperparameters.
             seed: of weights, exploration, sampling and the environment's first reset.
             learning_rate: of Adam, by environment step.
+            device: of torch, where it learns.
 
         Raises:
             ValueError: the spaces are not such boxes.
         """
-        super().__init__(env, settings, seed)
+        super().__init__(env, settings, seed, device)
         self.env, self.seed = env, seed
         self.learning_rate = learning_rate
         self.action_prior: Callable[[int], Array32] | None = None
@@ -191,7 +193,7 @@ class RecurrentTD3(RecurrentAgent):
             if batch is None:
                 return
             self._n_updates += 1
-            tensors = SequenceTensors.of(batch, self.settings.plus)
+            tensors = SequenceTensors.of(batch, self.settings.plus, self.device)
             self._record("train/critic_loss", self._update_critics(tensors))
             if self._n_updates % self.settings.policy_delay == 0:
                 self._record("train/actor_loss", self._update_actor(tensors))
@@ -210,12 +212,12 @@ class RecurrentTD3(RecurrentAgent):
 
     def _smoothing_noise(self, shape: torch.Size) -> Tensor:
         noise = self.rng.standard_normal(tuple(shape), dtype=np.float32).clip(-2.5, 2.5)
-        return torch.from_numpy(noise * np.float32(self.settings.smoothing_noise))
+        return self._tensor(noise * np.float32(self.settings.smoothing_noise))
 
     def _update_actor(self, batch: SequenceTensors) -> float:
         self.critic.requires_grad_(False)
         prior = None if self.action_prior is None else self.action_prior(self.num_timesteps)
-        weights = None if prior is None or not prior.any() else torch.from_numpy(prior)
+        weights = None if prior is None or not prior.any() else self._tensor(prior)
         loss = actor_loss(self.networks, batch, self.settings, weights)
         self.actor_optimizer.zero_grad()
         loss.backward()
