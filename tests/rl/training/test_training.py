@@ -63,6 +63,14 @@ def test_a_run_that_is_cut_resumes_to_the_same_weights(name, tmp_path):
         assert columns(whole / log, "seconds") == columns(cut / log, "seconds")
 
 
+@pytest.mark.parametrize("every", [1, 2, 5])
+def test_updates_come_every_so_many_steps(every, tmp_path):
+    run_training(tmp_path, PAPER, replace(SMALL["td3"], update_every=every), plan(100), resume=False)
+    last = read_rows(tmp_path / "training.csv")[-1]
+    assert int(last["step"]) == 100
+    assert int(last["updates"]) == sum(step > 40 for step in range(every, 101, every))
+
+
 def test_same_seed_same_weights_and_another_seed_others(tmp_path):
     for name, seed in (("a", 0), ("b", 0), ("c", 1)):
         run_training(tmp_path / name, PAPER, SMALL["td3"], plan(100, seed), resume=False)
