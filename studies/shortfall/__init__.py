@@ -1,8 +1,9 @@
 """Where policies fall short: what was seen of the ground that a landing failed on, and where propellant goes.
 
 `python -m studies.shortfall` is its command. `encoded_sight` holds looks and what an encoder keeps of them
-against the true map, `propellant_parts` flies episodes again with the last site known earlier; `command`
-reads the options and runs the study; its tables stand beside it. Nothing imports it.
+against the true map, `propellant_parts` flies episodes again with the last site known earlier, `flights` does
+both for an episode; `command` reads the options and runs the study; its tables stand beside it. Nothing
+imports it.
 """
 
 from typing import TYPE_CHECKING

@@ -1,9 +1,9 @@
-"""Where policies fall short: which ground their landings fail on, what was seen of it, and what moves cost.
+"""Where policies fall short: what was seen of safe ground before landings that failed, and what moves cost.
 
 Every failed landing is held against the looks before it and against what an encoder keeps of them, which is
-all that an agent sees. Over all flights it counts which hazards looks and encodings show, by height and by
-distance from safe ground. The propellant is parted by flying each episode again with the last site known
-ever later. A policy is a name, or the card (.json) of an agent's weights:
+all that an agent sees. Over all flights it counts which islands of safe ground the encodings show, by height
+and area, and which hazards, by height and distance from safe ground. The propellant is parted by flying each
+episode again with the last site known ever later. A policy is a name, or the card (.json) of weights:
 
 python -m studies.shortfall --policies td3 nearest-safe+convex
 python -m studies.shortfall --policies runs/weights/td3-convex.json nearest-safe+convex --split tuning
@@ -15,51 +15,38 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
-import numpy as np
 import tyro
 from rich.console import Console
 from rich.progress import track
 
 from guidance.console import tolerate_encoding
 from guidance.validation import finite_number
-from hda.flight.episode import fly
 from hda.ground.library import Ground, prepare_tiles
-from hda.policies.entry import AnyPolicy
-from hda.registry import make_policy
-from hda.task.presets import Preset, find_preset
+from hda.task.presets import find_preset
 from hda.task.scenario import sample_scenario
 from rl.inference.artefacts import load_artefact
-from rl.policies.actor import AgentPolicy
-from rl.policies.recurrent_actor import RecurrentAgentPolicy
-from rl.settings import WITH_MEMORY
 from studies.campaign.command_line import open_folder, resumable
 from studies.campaign.journal import open_journal
 from studies.campaign.provenance import describe_run, identify_run, write_provenance
 from studies.campaign.run_options import FolderOptions
 from studies.columns import console_table, write_csv, write_markdown
-from studies.shortfall.encoded_sight import (
-    Decoder,
-    count_seen,
-    explain_loss,
-    load_decoder,
-    measure_depth,
-    trace_site,
-)
-from studies.shortfall.propellant_parts import part_propellant
+from studies.shortfall.encoded_sight import load_decoder
+from studies.shortfall.flights import FlownEpisode, fly_episode, open_policy
+from studies.shortfall.propellant_table import PART_COLUMNS, PartRow, average_parts
 from studies.shortfall.table import (
+    HAZARD_COLUMNS,
+    ISLAND_COLUMNS,
     LOSS_COLUMNS,
-    PART_COLUMNS,
-    SEEN_COLUMNS,
-    FlownEpisode,
+    HazardRow,
+    IslandRow,
     LossRow,
-    PartRow,
-    SeenRow,
-    average_parts,
     count_losses,
-    share_seen,
+    share_hazards,
+    share_islands,
 )
 
-_PRODUCTS = ("losses.csv", "losses.md", "seen.csv", "seen.md", "parts.csv", "parts.md", "provenance.json")
+_TABLES = ("losses", "islands", "hazards", "parts")
+_PRODUCTS = (*(f"{name}.{kind}" for name in _TABLES for kind in ("csv", "md")), "provenance.json")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,65 +90,29 @@ class Shortfalls:
 
     Attributes:
         losses: failed landings.
-        seen: hazards that looks and encodings show.
+        islands: of safe ground that encodings show.
+        hazards: that looks and encodings show.
         parts: of the propellant.
     """
 
     losses: tuple[LossRow, ...]
-    seen: tuple[SeenRow, ...]
+    islands: tuple[IslandRow, ...]
+    hazards: tuple[HazardRow, ...]
     parts: tuple[PartRow, ...]
-
-
-def open_policy(name: str) -> AnyPolicy:
-    """A policy by its name or by the card of its weights.
-
-    Raises:
-        ValueError: the name is unknown.
-        ArtefactError: the weights are missing or damaged.
-    """
-    import rl  # noqa: F401 - registers the agents
-
-    if not name.endswith(".json"):
-        return make_policy(name)
-    weights = Path(name).with_suffix("")
-    remembers = load_artefact(weights, "actor").card.get("algorithm") in WITH_MEMORY
-    return (RecurrentAgentPolicy if remembers else AgentPolicy)(weights.name, weights)
-
-
-def fly_episode(
-    policy: AnyPolicy, preset: Preset, options: Shortfall, episode: int, decode: Decoder
-) -> FlownEpisode:
-    """Fly an episode, and the ones that part its propellant."""
-    scenario = sample_scenario(preset, options.study_seed, episode, options.split)
-    record = fly(policy, scenario)
-    decoded = decode(np.stack([observation.safety_map for observation in record.observations]))
-    depth = measure_depth(scenario.tile.deterministic, scenario.view.nominal_target)
-    outcome = record.outcome
-    sights = () if outcome.success else tuple(trace_site(record, decoded))
-    row, column = (np.floor(outcome.touchdown[axis : axis + 1]).astype(int) for axis in (1, 0))
-    return FlownEpisode(
-        tile=scenario.tile.number,
-        loss=explain_loss(record, sights),
-        depth=float(depth.read(row, column)[0]),
-        sights=sights,
-        time=float(record.time[-1]),
-        seen=tuple(count_seen(record, decoded, depth)),
-        parts=part_propellant(record),
-    )
 
 
 def score_flights(flown: dict[str, list[FlownEpisode]]) -> Shortfalls:
     """The tables of what was flown, by policy; the last one is what the others are held against."""
     *others, last = flown
     losses = [row for name, flights in flown.items() for row in count_losses(name, flights)]
-    seen = share_seen([flight for flights in flown.values() for flight in flights])
+    every = [flight for flights in flown.values() for flight in flights]
     parts = [average_parts(name, flights) for name, flights in flown.items()]
     parts += [average_parts(f"{name} less {last}", flown[name], flown[last]) for name in others]
-    return Shortfalls(tuple(losses), tuple(seen), tuple(parts))
+    return Shortfalls(tuple(losses), tuple(share_islands(every)), tuple(share_hazards(every)), tuple(parts))
 
 
 def study_shortfall(options: Shortfall) -> Shortfalls:
-    """Fly, write losses, seen and parts as .csv and .md with their provenance, and print the tables.
+    """Fly, write the tables as .csv and .md with their provenance, and print the tables.
 
     Raises:
         ValueError: an option names something unknown, or the folder holds another study.
@@ -175,18 +126,20 @@ def study_shortfall(options: Shortfall) -> Shortfalls:
     identity = identify_run(
         Path(__file__).parent, {**{name: getattr(options, name) for name in names}, "weights": weights}
     )
-    out, flown = open_folder(options.out), {}
+    out = open_folder(options.out)
+    flown: dict[str, list[FlownEpisode]] = {}
     with open_journal(out, FlownEpisode, _PRODUCTS, identity, options.existing) as journal:
         prepare_tiles(Ground(preset.terrain, preset.criteria), options.split, options.workers)
         for policy in policies:
-            numbers = track(range(options.episodes), policy.name, transient=True)
-            flown[policy.name] = [
-                journal.finish(
-                    (policy.name, number),
-                    lambda policy=policy, number=number: fly_episode(policy, preset, options, number, decode),
+            flights = flown[policy.name] = []
+            for number in track(range(options.episodes), policy.name, transient=True):
+                scenario = sample_scenario(preset, options.study_seed, number, options.split)
+                flights.append(
+                    journal.finish(
+                        (policy.name, number),
+                        lambda policy=policy, scenario=scenario: fly_episode(policy, scenario, decode),
+                    )
                 )
-                for number in numbers
-            ]
         scored = score_flights(flown)
         for name, columns, rows, _ in _list_tables(scored):
             write_csv(out / f"{name}.csv", columns, rows)
@@ -204,7 +157,8 @@ def _list_tables(scored: Shortfalls) -> tuple[tuple[str, Any, Any, str], ...]:
     """(name, columns, rows, title) of each."""
     return (
         ("losses", LOSS_COLUMNS, scored.losses, "failed landings"),
-        ("seen", SEEN_COLUMNS, scored.seen, "hazards within a move of the target"),
+        ("islands", ISLAND_COLUMNS, scored.islands, "islands of safe ground in looks"),
+        ("hazards", HAZARD_COLUMNS, scored.hazards, "hazards within a shift of the target"),
         ("parts", PART_COLUMNS, scored.parts, "where the propellant goes"),
     )
 

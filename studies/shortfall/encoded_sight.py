@@ -1,7 +1,7 @@
-"""What looks showed of hazardous ground, and what is left of it in their encodings.
+"""What looks showed of safe and of hazardous ground, and what is left of it in their encodings.
 
 An agent sees the 32 numbers that an encoder makes of a look. What they tell is what the decoder can draw of
-them: a pixel that the look reads as a hazard, and the decoded map as safe ground, is lost in the encoding.
+them: ground that the look reads as safe, and the decoded map as a hazard, is lost in the encoding.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from guidance.arrays import Array
 from hda.flight.record import EpisodeRecord
+from hda.task.observation import Observation
 from hda.task.scenario import ground_point
 from rl.environment.action import PAPER_ACTIONS
 from studies.failures.causes import SAFE_READING
@@ -25,6 +26,8 @@ HEIGHTS = (100.0, 200.0, 400.0, 700.0)
 """[m] of the lander above the target, between the bands that are counted apart."""
 DEPTHS = (0.0, 1.0, 2.0, 4.0)
 """[m] from a hazardous cell to the nearest safe one: greatest of each band; 0 is safe ground itself."""
+AREAS = (10.0, 30.0, 100.0, 300.0)
+"""[m^2] of an island of safe ground in a look: between the bands that are counted apart."""
 _AROUND = 200.0  # [m] of ground about the first target that a flight can look at
 
 Decoder = Callable[[NDArray[np.float32]], NDArray[np.float32]]
@@ -32,15 +35,14 @@ Decoder = Callable[[NDArray[np.float32]], NDArray[np.float32]]
 
 
 class Loss(StrEnum):
-    """What was seen, before a failed landing, of the ground at its last site."""
+    """What was seen, before a failed landing, of safe ground within a shift of the target."""
 
     NONE = "it did not fail"
     NOT_THE_GROUND = "the ground was safe, the flight failed otherwise"
     BESIDE = "the site was safe, the touchdown beside it was not"
-    NEVER_READ = "no look read the site as a hazard"
-    LOST = "a look read a hazard, no encoding showed it"
-    LATE = "the encoding of the last look alone showed it"
-    KEPT = "the encodings of earlier looks had shown it"
+    NONE_READ = "no look read safe ground within a shift of the target"
+    LOST = "looks read safe ground within a shift, no encoding showed any"
+    PASSED = "an encoding showed safe ground within a shift, the target did not stay there"
 
 
 @dataclass(frozen=True)
@@ -56,6 +58,36 @@ class SiteSight:
     time: float
     read: float
     encoded: float
+
+
+@dataclass(frozen=True)
+class NearSight:
+    """Safe ground in one look, as near the target as one decision can move it.
+
+    Attributes:
+        read: [m^2] that the look reads as safe.
+        encoded: [m^2] that its encoding shows as safe.
+    """
+
+    read: float
+    encoded: float
+
+
+@dataclass(frozen=True)
+class SeenIslands:
+    """Islands of safe ground in the looks of one band of heights: pixels that touch, corners count.
+
+    Attributes:
+        height: number of the band in `HEIGHTS`.
+        area: number of the band in `AREAS`.
+        islands: that the looks read.
+        shown: of these, those of which the encoding shows a pixel at least as safe.
+    """
+
+    height: int
+    area: int
+    islands: int
+    shown: int
 
 
 @dataclass(frozen=True)
@@ -115,7 +147,9 @@ def measure_depth(safe: NDArray[np.bool_], place: Array) -> HazardDepth:
     return HazardDepth((row, column), np.asarray(distance_transform_edt(~window)))
 
 
-def count_seen(record: EpisodeRecord, decoded: NDArray[np.float32], depth: HazardDepth) -> list[SeenHazards]:
+def count_hazards(
+    record: EpisodeRecord, decoded: NDArray[np.float32], depth: HazardDepth
+) -> list[SeenHazards]:
     """Count the pixels of a flight's looks, within a shift of the target, by height and depth of the hazard.
 
     Args:
@@ -125,12 +159,9 @@ def count_seen(record: EpisodeRecord, decoded: NDArray[np.float32], depth: Hazar
     """
     counts: NDArray[np.int_] = np.zeros((len(HEIGHTS) + 1, len(DEPTHS) + 1, 3), dtype=int)
     for index, observation in enumerate(record.observations):
-        height = float(observation.state.position[2] - observation.target[2])
-        band = int(np.searchsorted(HEIGHTS, height))
         rows, columns, read = read_pixels(record, index)
-        near = np.abs(observation.pixel_offset) <= PAPER_ACTIONS.shift * observation.width
         deep = depth.read(rows[:, None], columns[None, :])
-        kept = read & near[:, None] & near[None, :] & np.isfinite(deep)
+        kept, band = read & _within_shift(observation) & np.isfinite(deep), _band_of(observation)
         number = np.searchsorted(np.array(DEPTHS), deep[kept] - 1e-9)
         told = observation.safety_map[kept] < SAFE_READING, decoded[index][kept] < SAFE_READING
         counts[band, :, 0] += np.bincount(number, minlength=len(DEPTHS) + 1)
@@ -148,7 +179,7 @@ def trace_site(record: EpisodeRecord, decoded: NDArray[np.float32]) -> list[Site
 
     Args:
         record: the flight.
-        decoded: as of `count_seen`.
+        decoded: as of `count_hazards`.
     """
     site, sights = record.decisions[-1].site, []
     for index, observation in enumerate(record.observations):
@@ -159,12 +190,53 @@ def trace_site(record: EpisodeRecord, decoded: NDArray[np.float32]) -> list[Site
     return sights
 
 
-def explain_loss(record: EpisodeRecord, sights: Sequence[SiteSight]) -> Loss:
-    """Why a flight's last site looked like one to land on, where it failed.
+def count_islands(record: EpisodeRecord, decoded: NDArray[np.float32]) -> list[SeenIslands]:
+    """Count the islands of safe ground in a flight's looks by height and area.
 
     Args:
         record: the flight.
-        sights: of its last site.
+        decoded: as of `count_hazards`.
+    """
+    from scipy.ndimage import label
+
+    counts: NDArray[np.int_] = np.zeros((len(HEIGHTS) + 1, len(AREAS) + 1, 2), dtype=int)
+    for index, observation in enumerate(record.observations):
+        safe = read_pixels(record, index)[2] & (observation.safety_map >= SAFE_READING)
+        number: NDArray[np.int_] = label(safe, np.ones((3, 3)))[0]  # type: ignore[index]
+        islands = int(number.max()) + 1
+        pixels = np.bincount(number[safe], minlength=islands)[1:]
+        shown = np.bincount(number[safe & (decoded[index] >= SAFE_READING)], minlength=islands)[1:]
+        area = np.searchsorted(AREAS, pixels * observation.pixel_size**2)
+        for column, kept in enumerate((area, area[shown > 0])):
+            counts[_band_of(observation), :, column] += np.bincount(kept, minlength=len(AREAS) + 1)
+    return [
+        SeenIslands(*where, *(int(count) for count in counts[where]))
+        for where in np.ndindex(counts.shape[:2])
+        if counts[where][0]
+    ]
+
+
+def measure_near(record: EpisodeRecord, decoded: NDArray[np.float32]) -> list[NearSight]:
+    """Safe ground within a shift of the target, in each look and its encoding.
+
+    Args:
+        record: the flight.
+        decoded: as of `count_hazards`.
+    """
+    sights = []
+    for index, observation in enumerate(record.observations):
+        near = _within_shift(observation) & read_pixels(record, index)[2]
+        safe = [int((seen[near] >= SAFE_READING).sum()) for seen in (observation.safety_map, decoded[index])]
+        sights.append(NearSight(*(count * observation.pixel_size**2 for count in safe)))
+    return sights
+
+
+def explain_loss(record: EpisodeRecord, near: Sequence[NearSight]) -> Loss:
+    """Why a flight did not land on safe ground, where it failed.
+
+    Args:
+        record: the flight.
+        near: of its looks.
     """
     if record.outcome.success:
         return Loss.NONE
@@ -172,22 +244,20 @@ def explain_loss(record: EpisodeRecord, sights: Sequence[SiteSight]) -> Loss:
         return Loss.NOT_THE_GROUND
     if record.scenario.tile.is_safe(ground_point(record.scenario, record.decisions[-1].site)):
         return Loss.BESIDE
-    return name_loss(sights, record.observations[-1].time)
+    if not any(sight.read for sight in near):
+        return Loss.NONE_READ
+    return Loss.PASSED if any(sight.encoded for sight in near) else Loss.LOST
 
 
-def name_loss(sights: Sequence[SiteSight], last_look: float) -> Loss:
-    """What was seen of a hazardous site.
+def _band_of(observation: Observation) -> int:
+    """Number of the look's band in `HEIGHTS`."""
+    return int(np.searchsorted(HEIGHTS, float(observation.state.position[2] - observation.target[2])))
 
-    Args:
-        sights: of the site, in order.
-        last_look: [s] time of the flight's last look.
-    """
-    if all(sight.read >= SAFE_READING for sight in sights):
-        return Loss.NEVER_READ
-    shown = [sight.time for sight in sights if sight.encoded < SAFE_READING]
-    if not shown:
-        return Loss.LOST
-    return Loss.LATE if shown[0] >= last_look else Loss.KEPT
+
+def _within_shift(observation: Observation) -> NDArray[np.bool_]:
+    """Pixels that one decision can move the target to."""
+    near = np.abs(observation.pixel_offset) <= PAPER_ACTIONS.shift * observation.width
+    return near[:, None] & near[None, :]
 
 
 def load_decoder(encoder: str) -> Decoder:
