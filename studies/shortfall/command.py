@@ -37,15 +37,18 @@ from studies.shortfall.table import (
     HAZARD_COLUMNS,
     ISLAND_COLUMNS,
     LOSS_COLUMNS,
+    SHOWN_COLUMNS,
     HazardRow,
     IslandRow,
     LossRow,
+    ShownRow,
     count_losses,
+    count_shown,
     share_hazards,
     share_islands,
 )
 
-_TABLES = ("losses", "islands", "hazards", "parts")
+_TABLES = ("losses", "shown", "islands", "hazards", "parts")
 _PRODUCTS = (*(f"{name}.{kind}" for name in _TABLES for kind in ("csv", "md")), "provenance.json")
 
 
@@ -90,12 +93,14 @@ class Shortfalls:
 
     Attributes:
         losses: failed landings.
+        shown: flights by what encodings showed of safe ground near the target.
         islands: of safe ground that encodings show.
         hazards: that looks and encodings show.
         parts: of the propellant.
     """
 
     losses: tuple[LossRow, ...]
+    shown: tuple[ShownRow, ...]
     islands: tuple[IslandRow, ...]
     hazards: tuple[HazardRow, ...]
     parts: tuple[PartRow, ...]
@@ -105,10 +110,12 @@ def score_flights(flown: dict[str, list[FlownEpisode]]) -> Shortfalls:
     """The tables of what was flown, by policy; the last one is what the others are held against."""
     *others, last = flown
     losses = [row for name, flights in flown.items() for row in count_losses(name, flights)]
+    shown = [row for name, flights in flown.items() for row in count_shown(name, flights)]
     every = [flight for flights in flown.values() for flight in flights]
     parts = [average_parts(name, flights) for name, flights in flown.items()]
     parts += [average_parts(f"{name} less {last}", flown[name], flown[last]) for name in others]
-    return Shortfalls(tuple(losses), tuple(share_islands(every)), tuple(share_hazards(every)), tuple(parts))
+    islands, hazards = share_islands(every), share_hazards(every)
+    return Shortfalls(tuple(losses), tuple(shown), tuple(islands), tuple(hazards), tuple(parts))
 
 
 def study_shortfall(options: Shortfall) -> Shortfalls:
@@ -157,6 +164,7 @@ def _list_tables(scored: Shortfalls) -> tuple[tuple[str, Any, Any, str], ...]:
     """(name, columns, rows, title) of each."""
     return (
         ("losses", LOSS_COLUMNS, scored.losses, "failed landings"),
+        ("shown", SHOWN_COLUMNS, scored.shown, "flights by what encodings showed near the target"),
         ("islands", ISLAND_COLUMNS, scored.islands, "islands of safe ground in looks"),
         ("hazards", HAZARD_COLUMNS, scored.hazards, "hazards within a shift of the target"),
         ("parts", PART_COLUMNS, scored.parts, "where the propellant goes"),

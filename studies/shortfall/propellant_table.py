@@ -10,10 +10,9 @@ import numpy as np
 from studies.columns import Column
 from studies.shortfall.flights import FlownEpisode
 from studies.shortfall.propellant_parts import PropellantParts
+from studies.shortfall.table import EARLY
 from studies.statistics.moments import collect_moments, mean_intervals
 from studies.statistics.ratios import Interval
-
-_HIGH = 400.0  # [m] from which a move counts as early
 
 
 @dataclass(frozen=True)
@@ -24,7 +23,7 @@ class PartRow:
         policy: name, or both.
         whole: [%] propellant, clustered by tile, as are the other three parts of it.
         direct: [%] with the last site known from the start.
-        early: [%] for sites that were not the last, above `_HIGH`.
+        early: [%] for sites that were not the last, above `EARLY`.
         late: [%] below.
         guidance: [%] for another guidance law.
         moves: decisions that moved the target by a metre at least.
@@ -60,8 +59,8 @@ def average_parts(
 
 
 def _numbers(parts: PropellantParts) -> list[float]:
-    early = sum(move.cost for move in parts.moves if move.height >= _HIGH)
-    late = sum(move.cost for move in parts.moves if move.height < _HIGH)
+    early = sum(move.cost for move in parts.moves if move.height >= EARLY)
+    late = sum(move.cost for move in parts.moves if move.height < EARLY)
     lengths = [move.length for move in parts.moves if move.length >= 1.0]
     spent = [parts.whole, parts.direct, early, late, parts.guidance]
     return [*spent, len(lengths), sum(lengths), parts.offset, parts.time]
@@ -80,7 +79,7 @@ PART_COLUMNS: tuple[Column[PartRow], ...] = (
     ),
     Column(
         "early_percent",
-        f"other sites above {_HIGH:g} m",
+        f"other sites above {EARLY:g} m",
         lambda row: row.early,
         digits=2,
         unit="%",

@@ -21,6 +21,11 @@ from studies.shortfall.encoded_sight import (
 from studies.shortfall.flights import FlownEpisode
 from studies.statistics.ratios import Interval, clustered_count_interval
 
+SHOWN = (0.0, 100.0, 300.0)
+"""[m^2] of safe ground near the target: between the bands of flights that are counted apart."""
+EARLY = 400.0
+"""[m] above the target from which a look or a move counts as early."""
+
 
 @dataclass(frozen=True)
 class LossRow:
@@ -48,6 +53,24 @@ class LossRow:
     read: float
     encoded: float
     warned: float
+
+
+@dataclass(frozen=True)
+class ShownRow:
+    """Flights of a policy by how much safe ground near the target the encodings of its early looks showed.
+
+    Attributes:
+        policy: name.
+        shown: number of the band in `SHOWN` of the most safe ground that one encoding showed within a shift
+            of the target, from at least `EARLY` above it.
+        flights: how many.
+        failed: how many of them failed.
+    """
+
+    policy: str
+    shown: int
+    flights: int
+    failed: int
 
 
 @dataclass(frozen=True)
@@ -107,6 +130,28 @@ def count_losses(policy: str, flown: Sequence[FlownEpisode]) -> list[LossRow]:
                 )
             )
     return rows
+
+
+def count_shown(policy: str, flown: Sequence[FlownEpisode]) -> list[ShownRow]:
+    """Flights and failures by what the encodings of early looks showed of safe ground, the least first."""
+    most = [
+        max(
+            (
+                sight.encoded
+                for sight, move in zip(flight.near, flight.parts.moves, strict=True)
+                if move.height >= EARLY
+            ),
+            default=0.0,
+        )
+        for flight in flown
+    ]
+    bands = np.searchsorted(SHOWN, most)
+    failed = np.array([flight.loss is not Loss.NONE for flight in flown])
+    return [
+        ShownRow(policy, band, int((bands == band).sum()), int(failed[bands == band].sum()))
+        for band in range(len(SHOWN) + 1)
+        if (bands == band).any()
+    ]
 
 
 def share_islands(flown: Sequence[FlownEpisode]) -> list[IslandRow]:
@@ -171,6 +216,19 @@ LOSS_COLUMNS: tuple[Column[LossRow], ...] = (
     Column("warned_s", "hazard shown before touchdown", lambda row: row.warned, digits=1, unit="s"),
 )
 """losses.csv, losses.md and the console read this list."""
+
+SHOWN_COLUMNS: tuple[Column[ShownRow], ...] = (
+    Column("policy", "policy", lambda row: row.policy, words=True),
+    Column(
+        "shown_m2",
+        f"safe ground that encodings show within a shift, from above {EARLY:g} m; m²",
+        lambda row: _band(SHOWN, row.shown) if row.shown else "none",
+        words=True,
+    ),
+    Column("flights", "flights", lambda row: row.flights),
+    Column("failed", "failed", lambda row: row.failed),
+)
+"""shown.csv, shown.md and the console read this list."""
 
 ISLAND_COLUMNS: tuple[Column[IslandRow], ...] = (
     Column("height_m", "height m", lambda row: _band(HEIGHTS, row.height), words=True),
