@@ -62,6 +62,9 @@ GROUPS: dict[str, dict[str, Command]] = {
             "studies.information_bound.command", "InformationBound", "how far from the best possible it is"
         ),
         "failures": Command("studies.failures.command", "Failures", "why episodes of a comparison failed"),
+        "shortfall": Command(
+            "studies.shortfall.command", "Shortfall", "what an agent saw of ground it failed on; moves' cost"
+        ),
         "memory": Command("studies.memory.command", "MemoryStudy", "when memory helps an agent"),
         "stability": Command(
             "studies.stability.command", "Stability", "margins of ZEM/ZEV, and sampled flights"

@@ -61,6 +61,26 @@ RESULTS: dict[str, Result] = {
     ),
     "stability": Result("stability.md", "studies.stability"),
     "memory": Result("memory.md", "studies.memory", resumable=False),
+    "agents-paper": Result(
+        "learnt-agents.md",
+        "studies.compare --policies nearest-safe nearest-safe+convex hazard-aware --no-figures"
+        " --out results/agents_paper",
+    ),
+    "agents-partial": Result(
+        "learnt-agents.md",
+        "studies.compare --preset partial --policies nearest-safe nearest-safe+convex hazard-aware td3"
+        " --no-figures --out results/agents_partial",
+    ),
+    "agents-lidar": Result(
+        "learnt-agents.md",
+        "studies.compare --preset lidar --episodes 500 --policies nearest-safe nearest-safe+convex"
+        " hazard-aware td3 --no-figures --out results/agents_lidar",
+    ),
+    "learnt-agents": Result(
+        "learnt-agents.md",
+        "rl.figures agents --results results/agents_paper results/agents_partial results/agents_lidar",
+        resumable=False,
+    ),
     "planner": Result("planner.md", "studies.timing"),
     "answers": Result(
         "planner.md", "studies.timing --answers 100000 --starts 2 --out results/timing_answers"

@@ -96,6 +96,10 @@ RUNS: dict[str, tuple[list[str], list[str]]] = {
         ["swept/thrust-error.png"],
     ),
     "studies.sample_size": ([], []),
+    "studies.shortfall": (
+        ["--policies", "td3", "--episodes", "2", "--workers", "1", "--out", "short"],
+        ["short/losses.csv", "short/islands.csv", "short/parts.csv"],
+    ),
     "studies.scale": ([*SMALL, "--out", "scaled"], ["scaled/table.csv"]),
     "studies.stability": (["--gain-points", "2", "--out", "stable"], ["stable/stability.png"]),
     "studies.timing": (

@@ -9,10 +9,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rl.inference.artefacts import read_card
+from rl.policies.actor import weights_name
 from rl.training.run_folder import read_rows, read_run
 
 _SUCCESS = "success_percent", "success_low", "success_high"
 _BURNT = "propellant_percent", "propellant_percent_low", "propellant_percent_high"
+_PLAIN = "safe_site_percent", "touchdown_speed_mps"
+_SCORES = "success_percent", "propellant_percent", *_PLAIN
 
 
 @dataclass(frozen=True)
@@ -37,14 +40,20 @@ class FlownPolicy:
     Attributes:
         preset: setting that was flown.
         policy: name.
+        episodes: that it flew.
         success: [%].
         propellant: [%].
+        safe_site: [%]; nan where the table has none.
+        touchdown_speed: [m/s]; likewise.
     """
 
     preset: str
     policy: str
+    episodes: int
     success: Estimate
     propellant: Estimate
+    safe_site: float
+    touchdown_speed: float
 
 
 @dataclass(frozen=True)
@@ -53,19 +62,27 @@ class SeedScore:
 
     Attributes:
         preset: setting.
-        agent: recipe.
+        agent: name of its weights without that of the preset; of a run its recipe.
         seed: of the training.
         judged: split that it was flown on: "validation", or "tuning" where the run has no exported weights.
+        episodes: that it flew there.
+        shipped: it is the seed whose weights lie beside the card.
         success: [%].
         propellant: [%].
+        safe_site: [%].
+        touchdown_speed: [m/s].
     """
 
     preset: str
     agent: str
     seed: int
     judged: str
+    episodes: int
+    shipped: bool
     success: float
     propellant: float
+    safe_site: float
+    touchdown_speed: float
 
 
 def read_tables(folders: Sequence[Path]) -> list[FlownPolicy]:
@@ -82,7 +99,8 @@ def read_tables(folders: Sequence[Path]) -> list[FlownPolicy]:
                     key = row["preset"], row["policy"].removesuffix(" *")
                     success = Estimate(*(float(row[name]) for name in _SUCCESS))
                     burnt = Estimate(*(float(row.get(name) or math.nan) for name in _BURNT))
-                    rows[key] = FlownPolicy(*key, success, burnt)
+                    plain = [float(row.get(name) or math.nan) for name in _PLAIN]
+                    rows[key] = FlownPolicy(*key, int(row["episodes"]), success, burnt, *plain)
         except (OSError, KeyError, TypeError, ValueError) as error:
             raise ValueError(f"{folder} holds no table of policies on presets: {error!r}") from error
     return list(rows.values())
@@ -108,8 +126,9 @@ def read_seeds(cards: Sequence[Path], runs: Sequence[Path]) -> list[SeedScore]:
             raise ValueError(f"{folder} has no validated actor")
         key = card["preset"], card["recipe"], card["seed"]
         try:
-            numbers = float(rows[-1]["success_percent"]), float(rows[-1]["propellant_percent"])
-            scores.setdefault(key, SeedScore(*key, "tuning", *numbers))
+            flown = int(float(rows[-1]["episodes"]))
+            numbers = [float(rows[-1][name]) for name in _SCORES]
+            scores.setdefault(key, SeedScore(*key, "tuning", flown, False, *numbers))
         except (KeyError, TypeError, ValueError) as error:
             raise ValueError(f"{folder} has no validated actor: {error!r}") from error
     return list(scores.values())
@@ -126,15 +145,28 @@ def _read_card_seeds(path: Path) -> dict[tuple[str, str, int], SeedScore]:
     try:
         training = card["training"]
         preset = training["preset"]
-        agent = training.get("recipe", path.stem.removesuffix(f"-{preset}"))
+        agent = path.stem if preset == "paper" else path.stem.removesuffix(f"-{preset}")  # as `weights_name`
         for entry in training["seeds"]:
             flown = entry["validation"]
-            numbers = float(flown["success_percent"]), float(flown["propellant_percent"])
-            key = preset, agent, entry["seed"]
-            scores[key] = SeedScore(*key, "validation", *numbers)
+            numbers = [float(flown[name]) for name in _SCORES]
+            key, shipped = (preset, agent, entry["seed"]), entry["seed"] == training["seed"]
+            scores[key] = SeedScore(*key, "validation", int(flown["episodes"]), shipped, *numbers)
     except (KeyError, TypeError, AttributeError, ValueError) as error:
         raise ValueError(f"{path} is not a card of exported weights: {error!r}") from error
     return scores
+
+
+def weights_row(flown: dict[str, FlownPolicy], agent: str, learnt: bool) -> FlownPolicy | None:
+    """An agent's row among those of one preset, by policy.
+
+    Args:
+        flown: the rows.
+        agent: recipe.
+        learnt: of the weights that learnt on the preset, or of those of `paper` flown elsewhere.
+    """
+    preset = next(iter(flown.values())).preset if flown else ""
+    name = weights_name(agent, preset)
+    return flown.get(name) if learnt else flown.get(agent) if name != agent else None
 
 
 def find_cards(folder: Path) -> list[Path]:

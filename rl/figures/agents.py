@@ -3,14 +3,23 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from hda.flight.palette import COLORS, MATPLOTLIB_DASHES, line_style
-from rl.figures.agent_scores import Estimate, FlownPolicy, SeedScore, find_cards, read_seeds, read_tables
+from hda.task.presets import PRESETS
+from rl.figures.agent_scores import (
+    Estimate,
+    FlownPolicy,
+    SeedScore,
+    find_cards,
+    read_seeds,
+    read_tables,
+    weights_row,
+)
 from rl.figures.options import AgentsFigure
 from rl.figures.sheet import open_figure
-from rl.policies.actor import weights_name
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,18 +32,19 @@ MEASURES = {"success": "success [%]", "propellant": "propellant burnt [%]"}
 def draw_agents(options: AgentsFigure) -> Figure:
     """Draw success above and propellant below, one column a preset: seeds as dots, tables with intervals.
 
+    Prints the numbers as a table for a document.
+
     Raises:
         ValueError: there is nothing to draw, or a folder or card is none.
     """
-    seeds = read_seeds(find_cards(options.weights), options.runs)
-    tables = read_tables(options.results)
-    presets = list(dict.fromkeys(row.preset for row in tables)) or sorted({s.preset for s in seeds})
-    presets = [name for name in presets if not options.presets or name in options.presets]
+    seeds, tables = read_seeds(find_cards(options.weights), options.runs), read_tables(options.results)
+    presets = _choose_presets(seeds, tables, options.presets)
     agents = list(dict.fromkeys(score.agent for score in seeds if score.preset in presets))
     if not agents:
         raise ValueError(
             f"nothing to draw: weights {options.weights}, runs and results name no agent and preset"
         )
+    sys.stdout.write("\n".join(describe_agents(presets, seeds, tables, options.beside)) + "\n")
     figure = open_figure((0.42 * len(agents) + 1.0) * len(presets) + 1.6, 7.0)
     grid: Any = figure.subplots(len(MEASURES), len(presets), sharex=True, sharey="row", squeeze=False)
     for column, preset in enumerate(presets):
@@ -54,6 +64,66 @@ def draw_agents(options: AgentsFigure) -> Figure:
     }
     figure.legend(list(named.values()), list(named), loc="outside lower center", ncols=3, frameon=False)
     return figure
+
+
+def _choose_presets(
+    seeds: Sequence[SeedScore], tables: Sequence[FlownPolicy], wanted: Sequence[str]
+) -> list[str]:
+    """Settings on which an agent has learnt or a table was flown, in the order of the presets."""
+    named = {score.preset for score in seeds} | {row.preset for row in tables}
+    ordered = [name for name in PRESETS if name in named] + sorted(named - set(PRESETS))
+    return [name for name in ordered if not wanted or name in wanted]
+
+
+def describe_agents(
+    presets: Sequence[str], seeds: Sequence[SeedScore], tables: Sequence[FlownPolicy], beside: Sequence[str]
+) -> list[str]:
+    """The table for a document, in Markdown: on each preset the policies beside, then agents by seed.
+
+    Args:
+        presets: in their order.
+        seeds: scores of training seeds.
+        tables: rows of studies.
+        beside: policies that are not learnt.
+    """
+    lines = [
+        "| preset | policy | seed | episodes | safe site % | success % | propellant % | touchdown m/s |",
+        "|---|---|---:|---|---:|---:|---:|---:|",
+    ]
+    for preset in presets:
+        flown = {row.policy: row for row in tables if row.preset == preset}
+        own = sorted((s for s in seeds if s.preset == preset), key=lambda s: (_order(seeds, s.agent), s.seed))
+        lines += [_line(preset, f"`{name}`", "", flown[name]) for name in beside if name in flown]
+        lines += [
+            _line(preset, f"`{score.agent}`", f"{score.seed}{', shipped' if score.shipped else ''}", score)
+            for score in own
+        ]
+        lines += [
+            _line(preset, f"`{agent}`, learnt on `paper`", "", row)
+            for agent in dict.fromkeys(score.agent for score in seeds)
+            if (row := weights_row(flown, agent, learnt=False))
+        ]
+    return lines
+
+
+def _order(seeds: Sequence[SeedScore], agent: str) -> int:
+    return list(dict.fromkeys(score.agent for score in seeds)).index(agent)
+
+
+def _line(preset: str, name: str, seed: str, row: FlownPolicy | SeedScore) -> str:
+    """A row of the table; a policy of a study's table has an interval."""
+    split = row.judged if isinstance(row, SeedScore) else ""
+    values = []
+    for value, digits in ((row.success, 1), (row.propellant, 1)):
+        middle = value.value if isinstance(value, Estimate) else value
+        values.append(f"{middle:.{digits}f}")
+    if isinstance(row.success, Estimate):
+        values[0] += f" ({row.success.low:.1f}-{row.success.high:.1f})"
+    safe, speed = (
+        "" if math.isnan(x) else f"{x:.{d}f}" for x, d in ((row.safe_site, 1), (row.touchdown_speed, 2))
+    )
+    cells = [preset, name, seed, f"{row.episodes} {split}".strip(), safe, *values, speed]
+    return f"| {' | '.join(cells)} |"
 
 
 def _draw_lines(axes: Axes, flown: dict[str, FlownPolicy], names: Sequence[str], measure: str) -> None:
@@ -94,7 +164,9 @@ def _draw_agents(
         (True, COLORS[1], "weights learnt there, and 95 % interval"),
         (False, COLORS[2], "weights learnt on paper"),
     ):
-        rows = [(place, row) for place, agent in enumerate(agents) if (row := _row(flown, agent, learnt))]
+        rows = [
+            (place, row) for place, agent in enumerate(agents) if (row := weights_row(flown, agent, learnt))
+        ]
         if rows:
             found: list[Estimate] = [getattr(row, measure) for _, row in rows]
             middles = [each.value for each in found]
@@ -109,10 +181,3 @@ def _draw_agents(
             )
     axes.grid(axis="y", alpha=0.25)
     axes.set_xlim(-0.6, len(agents) - 0.4)
-
-
-def _row(flown: dict[str, FlownPolicy], agent: str, learnt: bool) -> FlownPolicy | None:
-    """An agent's row: of the weights that learnt on the preset, or of those of `paper` flown elsewhere."""
-    preset = next(iter(flown.values())).preset if flown else ""
-    name = weights_name(agent, preset)
-    return flown.get(name) if learnt else flown.get(agent) if name != agent else None

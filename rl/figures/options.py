@@ -88,7 +88,7 @@ class ComparisonFigure:
 
 @dataclass(frozen=True)
 class AgentsFigure:
-    """Every learnt agent beside a rule and an optimiser, on each preset, by training seed.
+    """Every learnt agent beside rules and an optimiser, on each preset, by training seed: picture and table.
 
     Attributes:
         results: folders of `studies.compare` and `studies.realism`, whose `table.csv` gives the intervals.
@@ -102,7 +102,11 @@ class AgentsFigure:
     results: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="DIR ...")] = ()
     runs: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="DIR ...")] = ()
     weights: Annotated[Path, tyro.conf.arg(metavar="DIR")] = WEIGHTS_FOLDER
-    beside: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME ...")] = ("nearest-safe", "hazard-aware")
+    beside: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME ...")] = (
+        "nearest-safe",
+        "nearest-safe+convex",
+        "hazard-aware",
+    )
     presets: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME ...")] = ()
     out: Path = _OUT / "agents.png"
 

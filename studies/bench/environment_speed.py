@@ -20,10 +20,14 @@ from gymnasium.vector import AutoresetMode
 from guidance.validation import finite_number
 from studies.columns import Column
 
-IDS = ("rl:LunarHDA-v0", "rl:LunarHDA-Map-v0")
-_MANY, _FEW, _PROCESSES = 64, 8, 4  # environments of a native vector, and of Gymnasium's own
-_STEPS = 1024  # of one round, all environments together
-SINGLE, NATIVE = "one", f"native, {_MANY}"
+BATCHED = ("rl:LunarHDA-v0", "rl:LunarHDA-Map-v0")
+"""Ids whose vector of their own flies all episodes in one batch."""
+STEPPED = ("rl:LunarHDA-Site-v0", "rl:LunarHDA-Belief-v0")
+"""Ids whose vector of their own steps single environments in turn."""
+_MANY, _FEW, _PROCESSES = 64, 8, 4  # environments of a native vector, and of the others
+_STEPS: dict[str, int] = {**dict.fromkeys(BATCHED, 1024), **dict.fromkeys(STEPPED, 128)}
+"""Of one round, all environments together; fewer where each plans or believes."""
+SINGLE, NATIVE, IN_TURN = "one", f"native, {_MANY}", f"stepped, {_FEW}"
 
 
 @dataclass(frozen=True)
@@ -64,19 +68,21 @@ def measure_environments(rounds: int = 5) -> list[StepRate]:
         ValueError: `rounds` is less than one.
     """
     finite_number("rounds", rounds, at_least=1)
-    return [rate for name in IDS for rate in _measure(name, rounds)]
+    return [rate for name in (*BATCHED, *STEPPED) for rate in _measure(name, rounds)]
 
 
-def _vectors() -> dict[str, tuple[int, dict[str, Any]]]:
-    """How many environments, and arguments of `make_vec`, of every way to fly many."""
+def _vectors(name: str) -> dict[str, tuple[int, dict[str, Any]]]:
+    """How many environments, and arguments of `make_vec`, of every way to fly many of an id."""
     cores = os.cpu_count() or 1
     same = {"autoreset_mode": AutoresetMode.SAME_STEP}
     fresh = {"vectorization_mode": "async", "vector_kwargs": {"context": "spawn", **same}}
     ways: dict[str, tuple[int, dict[str, Any]]] = {
         f"sync, {_FEW}": (_FEW, {"vectorization_mode": "sync", "vector_kwargs": same}),
         f"async, {_PROCESSES} processes": (_PROCESSES, fresh),
-        NATIVE: (_MANY, {}),
     }
+    if name in STEPPED:
+        return ways | {IN_TURN: (_FEW, {})}
+    ways[NATIVE] = _MANY, {}
     if cores > 1:
         ways[f"{NATIVE}, {cores} threads"] = (_MANY, {"threads": cores})
     return ways
@@ -87,11 +93,11 @@ def _measure(name: str, rounds: int) -> list[StepRate]:
     with ExitStack() as opened:
         single = gymnasium.make(name)
         opened.callback(single.close)
-        ways = {SINGLE: _fly_single(single)}
-        for way, (count, options) in _vectors().items():
+        ways = {SINGLE: _fly_single(single, _STEPS[name])}
+        for way, (count, options) in _vectors(name).items():
             vector = gymnasium.make_vec(name, count, **options)
             opened.callback(vector.close)
-            ways[way] = _fly_vector(vector)
+            ways[way] = _fly_vector(vector, _STEPS[name])
         for way in list(ways) * (rounds + 1):
             started = time.perf_counter(), time.process_time()
             ways[way]()
@@ -101,17 +107,17 @@ def _measure(name: str, rounds: int) -> list[StepRate]:
 
 
 def _rate(name: str, way: str, times: Mapping[str, list[tuple[float, float]]]) -> StepRate:
-    wall, processor = np.median(times[way][1:], axis=0) / _STEPS
+    wall, processor = np.median(times[way][1:], axis=0) / _STEPS[name]
     elsewhere = way.startswith("async")
     return StepRate(name.removeprefix("rl:"), way, float(wall), np.nan if elsewhere else float(processor))
 
 
-def _fly_single(env: gymnasium.Env[Any, Any]) -> Callable[[], None]:
-    rng = np.random.default_rng(0)
+def _fly_single(env: gymnasium.Env[Any, Any], steps: int) -> Callable[[], None]:
+    rng, size = np.random.default_rng(0), env.action_space.shape or ()
     env.reset(seed=0)
 
     def fly() -> None:
-        for action in rng.uniform(-1.0, 1.0, (_STEPS, 5)).astype(np.float32):
+        for action in rng.uniform(-1.0, 1.0, (steps, *size)).astype(np.float32):
             _, _, terminated, truncated, _ = env.step(action)
             if terminated or truncated:
                 env.reset()
@@ -119,12 +125,12 @@ def _fly_single(env: gymnasium.Env[Any, Any]) -> Callable[[], None]:
     return fly
 
 
-def _fly_vector(vector: gymnasium.vector.VectorEnv[Any, Any, Any]) -> Callable[[], None]:
-    rng, count = np.random.default_rng(0), vector.num_envs
+def _fly_vector(vector: gymnasium.vector.VectorEnv[Any, Any, Any], steps: int) -> Callable[[], None]:
+    rng, shape = np.random.default_rng(0), vector.action_space.shape or ()
     vector.reset(seed=0)
 
     def fly() -> None:
-        for action in rng.uniform(-1.0, 1.0, (_STEPS // count, count, 5)).astype(np.float32):
+        for action in rng.uniform(-1.0, 1.0, (steps // vector.num_envs, *shape)).astype(np.float32):
             vector.step(action)
 
     return fly

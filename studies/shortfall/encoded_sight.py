@@ -1,0 +1,285 @@
+"""What looks showed of safe and of hazardous ground, and what is left of it in their encodings.
+
+An agent sees the 32 numbers that an encoder makes of a look. What they tell is what the decoder can draw of
+them: ground that the look reads as safe, and the decoded map as a hazard, is lost in the encoding.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from guidance.arrays import Array
+from hda.flight.record import EpisodeRecord
+from hda.task.observation import Observation
+from hda.task.scenario import ground_point
+from rl.environment.action import PAPER_ACTIONS
+from studies.failures.causes import SAFE_READING
+from studies.failures.readings import read_pixels
+
+HEIGHTS = (100.0, 200.0, 400.0, 700.0)
+"""[m] of the lander above the target, between the bands that are counted apart."""
+DEPTHS = (0.0, 1.0, 2.0, 4.0)
+"""[m] from a hazardous cell to the nearest safe one: greatest of each band; 0 is safe ground itself."""
+AREAS = (10.0, 30.0, 100.0, 300.0)
+"""[m^2] of an island of safe ground in a look: between the bands that are counted apart."""
+_AROUND = 200.0  # [m] of ground about the first target that a flight can look at
+
+Decoder = Callable[[NDArray[np.float32]], NDArray[np.float32]]
+"""Maps (n, 64, 64) -> what is left of them in their encodings, the same shape."""
+
+
+class Loss(StrEnum):
+    """What was seen, before a failed landing, of safe ground within a shift of the target."""
+
+    NONE = "it did not fail"
+    NOT_THE_GROUND = "the ground was safe, the flight failed otherwise"
+    BESIDE = "the site was safe, the touchdown beside it was not"
+    NONE_READ = "no look read safe ground within a shift of the target"
+    LOST = "looks read safe ground within a shift, no encoding showed any"
+    PASSED = "an encoding showed safe ground within a shift, the target did not stay there"
+
+
+@dataclass(frozen=True)
+class SiteSight:
+    """What one look said of a place.
+
+    Attributes:
+        time: [s] of the look.
+        read: safety that its pixel read.
+        encoded: safety that is left of it in the encoding.
+    """
+
+    time: float
+    read: float
+    encoded: float
+
+
+@dataclass(frozen=True)
+class NearSight:
+    """Safe ground in one look, as near the target as one decision can move it.
+
+    Attributes:
+        read: [m^2] that the look reads as safe.
+        encoded: [m^2] that its encoding shows as safe.
+    """
+
+    read: float
+    encoded: float
+
+
+@dataclass(frozen=True)
+class SeenIslands:
+    """Islands of safe ground in the looks of one band of heights: pixels that touch, corners count.
+
+    Attributes:
+        height: number of the band in `HEIGHTS`.
+        area: number of the band in `AREAS`.
+        islands: that the looks read.
+        shown: of these, those of which the encoding shows a pixel at least as safe.
+    """
+
+    height: int
+    area: int
+    islands: int
+    shown: int
+
+
+@dataclass(frozen=True)
+class SeenHazards:
+    """Pixels that a policy could have moved its target to, from the looks in one band of heights.
+
+    Attributes:
+        height: number of the band in `HEIGHTS`.
+        depth: number of the band in `DEPTHS`; the first is safe ground.
+        pixels: that read the ground.
+        read: of these, those that the look read as a hazard.
+        encoded: those that the encoding shows as one.
+    """
+
+    height: int
+    depth: int
+    pixels: int
+    read: int
+    encoded: int
+
+
+@dataclass(frozen=True, eq=False)
+class HazardDepth:
+    """How far each cell near an episode's first target lies from safe ground.
+
+    Attributes:
+        corner: (row, column) of the first cell.
+        depth: [m] shape (rows, columns), to the nearest safe cell; 0 on safe ground.
+    """
+
+    corner: tuple[int, int]
+    depth: Array
+
+    def read(self, rows: NDArray[np.int_], columns: NDArray[np.int_]) -> Array:
+        """[m] of cells of the tile, as the arrays broadcast; nan outside what is held."""
+        i, j = np.broadcast_arrays(rows - self.corner[0], columns - self.corner[1])
+        inside = (i >= 0) & (i < self.depth.shape[0]) & (j >= 0) & (j < self.depth.shape[1])
+        found = np.full(i.shape, math.nan)
+        found[inside] = self.depth[i[inside], j[inside]]
+        return found
+
+
+def measure_depth(safe: NDArray[np.bool_], place: Array) -> HazardDepth:
+    """Distances to safe ground around a place.
+
+    Args:
+        safe: shape (rows, columns), the true map.
+        place: [m] x and y of the middle.
+    """
+    from scipy.ndimage import distance_transform_edt
+
+    row, column = (max(0, int(place[axis] - _AROUND)) for axis in (1, 0))
+    end = (int(place[axis] + _AROUND) for axis in (1, 0))
+    window = safe[row : next(end), column : next(end)]
+    if not window.any():
+        return HazardDepth((row, column), np.full(window.shape, math.inf))
+    return HazardDepth((row, column), np.asarray(distance_transform_edt(~window)))
+
+
+def count_hazards(
+    record: EpisodeRecord, decoded: NDArray[np.float32], depth: HazardDepth
+) -> list[SeenHazards]:
+    """Count the pixels of a flight's looks, within a shift of the target, by height and depth of the hazard.
+
+    Args:
+        record: the flight.
+        decoded: shape (looks, n, n), what its looks' encodings show.
+        depth: of the ground.
+    """
+    counts: NDArray[np.int_] = np.zeros((len(HEIGHTS) + 1, len(DEPTHS) + 1, 3), dtype=int)
+    for index, observation in enumerate(record.observations):
+        rows, columns, read = read_pixels(record, index)
+        deep = depth.read(rows[:, None], columns[None, :])
+        kept, band = read & _within_shift(observation) & np.isfinite(deep), _band_of(observation)
+        number = np.searchsorted(np.array(DEPTHS), deep[kept] - 1e-9)
+        told = observation.safety_map[kept] < SAFE_READING, decoded[index][kept] < SAFE_READING
+        counts[band, :, 0] += np.bincount(number, minlength=len(DEPTHS) + 1)
+        for column, called in enumerate(told, 1):
+            counts[band, :, column] += np.bincount(number[called], minlength=len(DEPTHS) + 1)
+    return [
+        SeenHazards(*where, *(int(count) for count in counts[where]))
+        for where in np.ndindex(counts.shape[:2])
+        if counts[where][0]
+    ]
+
+
+def trace_site(record: EpisodeRecord, decoded: NDArray[np.float32]) -> list[SiteSight]:
+    """What each look that read the ground at a flight's last site said of it, in order.
+
+    Args:
+        record: the flight.
+        decoded: as of `count_hazards`.
+    """
+    site, sights = record.decisions[-1].site, []
+    for index, observation in enumerate(record.observations):
+        pixel = observation.pixel(site)
+        if pixel is not None and read_pixels(record, index)[2][pixel]:
+            read, encoded = float(observation.safety_map[pixel]), float(decoded[index][pixel])
+            sights.append(SiteSight(observation.time, read, encoded))
+    return sights
+
+
+def count_islands(record: EpisodeRecord, decoded: NDArray[np.float32]) -> list[SeenIslands]:
+    """Count the islands of safe ground in a flight's looks by height and area.
+
+    Args:
+        record: the flight.
+        decoded: as of `count_hazards`.
+    """
+    from scipy.ndimage import label
+
+    counts: NDArray[np.int_] = np.zeros((len(HEIGHTS) + 1, len(AREAS) + 1, 2), dtype=int)
+    for index, observation in enumerate(record.observations):
+        safe = read_pixels(record, index)[2] & (observation.safety_map >= SAFE_READING)
+        number: NDArray[np.int_] = label(safe, np.ones((3, 3)))[0]  # type: ignore[index]
+        islands = int(number.max()) + 1
+        pixels = np.bincount(number[safe], minlength=islands)[1:]
+        shown = np.bincount(number[safe & (decoded[index] >= SAFE_READING)], minlength=islands)[1:]
+        area = np.searchsorted(AREAS, pixels * observation.pixel_size**2)
+        for column, kept in enumerate((area, area[shown > 0])):
+            counts[_band_of(observation), :, column] += np.bincount(kept, minlength=len(AREAS) + 1)
+    return [
+        SeenIslands(*where, *(int(count) for count in counts[where]))
+        for where in np.ndindex(counts.shape[:2])
+        if counts[where][0]
+    ]
+
+
+def measure_near(record: EpisodeRecord, decoded: NDArray[np.float32]) -> list[NearSight]:
+    """Safe ground within a shift of the target, in each look and its encoding.
+
+    Args:
+        record: the flight.
+        decoded: as of `count_hazards`.
+    """
+    sights = []
+    for index, observation in enumerate(record.observations):
+        near = _within_shift(observation) & read_pixels(record, index)[2]
+        safe = [int((seen[near] >= SAFE_READING).sum()) for seen in (observation.safety_map, decoded[index])]
+        sights.append(NearSight(*(count * observation.pixel_size**2 for count in safe)))
+    return sights
+
+
+def explain_loss(record: EpisodeRecord, near: Sequence[NearSight]) -> Loss:
+    """Why a flight did not land on safe ground, where it failed.
+
+    Args:
+        record: the flight.
+        near: of its looks.
+    """
+    if record.outcome.success:
+        return Loss.NONE
+    if record.outcome.safe_site:
+        return Loss.NOT_THE_GROUND
+    if record.scenario.tile.is_safe(ground_point(record.scenario, record.decisions[-1].site)):
+        return Loss.BESIDE
+    if not any(sight.read for sight in near):
+        return Loss.NONE_READ
+    return Loss.PASSED if any(sight.encoded for sight in near) else Loss.LOST
+
+
+def _band_of(observation: Observation) -> int:
+    """Number of the look's band in `HEIGHTS`."""
+    return int(np.searchsorted(HEIGHTS, float(observation.state.position[2] - observation.target[2])))
+
+
+def _within_shift(observation: Observation) -> NDArray[np.bool_]:
+    """Pixels that one decision can move the target to."""
+    near = np.abs(observation.pixel_offset) <= PAPER_ACTIONS.shift * observation.width
+    return near[:, None] & near[None, :]
+
+
+def load_decoder(encoder: str) -> Decoder:
+    """The shipped encoder and its decoder, one behind the other.
+
+    Args:
+        encoder: its name.
+
+    Raises:
+        TrainingLibrariesError: torch, which decodes, is not installed.
+        ValueError: there is no encoder of that name.
+    """
+    from rl.inference.latent import encoder_path, load_autoencoder
+    from rl.training_libraries import require_training_libraries
+
+    path = encoder_path(encoder)
+    require_training_libraries()
+    from rl.learning.autoencoder import autoencoder_from_tensors, reconstruct
+
+    network = autoencoder_from_tensors(load_autoencoder(path).tensors)
+
+    def decode(maps: NDArray[np.float32]) -> NDArray[np.float32]:
+        return reconstruct(network, np.round(maps * 255.0).astype(np.uint8))
+
+    return decode
