@@ -16,7 +16,7 @@ from guidance.arrays import Array
 from guidance.rigid_body.body import BodyNumbers
 from guidance.rigid_body.motion import fly_intervals, rate_into
 from guidance.rigid_body.quaternion import rotate_into, tilt_angle
-from guidance.rigid_descent import RigidFlight
+from guidance.rigid_descent import RigidFlight, cut_commands
 from studies.rigid_plans.peer_problems import PeerProblem, Surroundings
 
 PARTS = 4
@@ -46,14 +46,8 @@ class CommandedFlight:
 
     def cut(self, parts: int) -> tuple[Array, Array, Array]:
         """Durations, thrust and torque with each interval cut in equal parts."""
-        shares = np.linspace(0.0, 1.0, parts + 1)
-
-        def split(commands: Array) -> Array:
-            first, last = commands[:, None, 0], commands[:, None, 1]
-            at = first + shares[None, :, None] * (last - first)
-            return np.stack([at[:, :-1], at[:, 1:]], axis=2).reshape(-1, 2, 3)
-
-        return np.repeat(np.diff(self.time) / parts, parts), split(self.thrust), split(self.torque)
+        durations = np.repeat(np.diff(self.time) / parts, parts)
+        return durations, cut_commands(self.thrust, parts), cut_commands(self.torque, parts)
 
 
 def fly_commanded(flight: CommandedFlight, peer: PeerProblem) -> Array:

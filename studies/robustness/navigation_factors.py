@@ -92,7 +92,7 @@ NAVIGATION_FACTORS: tuple[Factor, ...] = (
         ("gyroscope", "bias"),
         "gyroscope-bias",
         "bias of the gyroscope about each axis (1 sigma) [deg/h]",
-        (100.0, 10.0, 0.0),
+        (1000.0, 100.0, 10.0, 0.0),
         math.radians(1.0) / 3600.0,
     ),
     _sensor_factor(
