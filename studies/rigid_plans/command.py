@@ -99,7 +99,8 @@ def study_rigid_plans(options: RigidPlans) -> list[MethodRow]:
         write_provenance(out / "provenance.json", {**describe_run(options), "work": journal.describe()})
     if python is not None:
         answers = ask_peers(options, python, openscvx)
-        console.print(console_table(PEER_COLUMNS, sum_up_peers(answers), "beside OpenSCvx"))
+        wide = Console(width=max(Console().width, 190))
+        wide.print(console_table(PEER_COLUMNS, sum_up_peers(answers), "beside OpenSCvx"))
         words += conclude_peers(answers)
     title = f"a body that must turn: {options.starts} starts of {options.preset}"
     console.print(console_table(COLUMNS, rows, title))

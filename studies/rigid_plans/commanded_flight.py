@@ -71,13 +71,8 @@ def fly_commanded(flight: CommandedFlight, peer: PeerProblem) -> Array:
 def fly_in_air(
     start: Array, thrust: Array, torque: Array, durations: Array, body: BodyNumbers, around: Surroundings
 ) -> Array:
-    """As `fly_intervals`, for an engine without a lag, in air and with a leak.
-
-    Raises:
-        ValueError: the engine has a lag.
-    """
-    if body.engine_lag > 0.0:
-        raise ValueError("body: fly_in_air has no engine lag")
+    """As `fly_intervals`, for an engine without a lag, in air and with a leak."""
+    assert body.engine_lag == 0.0
     from scipy.integrate import solve_ivp
 
     path = np.zeros((durations.size + 1, start.size))

@@ -177,10 +177,9 @@ def conclude_peers(answers: Sequence[PeerAnswer]) -> list[str]:
     for row in sum_up_peers(answers):
         if not row.method.startswith(OPENSCVX_METHOD):
             continue
-        own = {a.start: a for a in answers if a.problem == row.problem and a.method.startswith(OWN_METHOD)}
-        own = {start: a for start, a in own.items() if not math.isnan(a.burnt)}
-        mine = [a for a in answers if (a.problem, a.method) == (row.problem, row.method)]
-        both = [(a, own[a.start]) for a in mine if a.start in own and not math.isnan(a.burnt)]
+        planned = [a for a in answers if a.problem == row.problem and not math.isnan(a.burnt)]
+        own = {a.start: a for a in planned if a.method.startswith(OWN_METHOD)}
+        both = [(a, own[a.start]) for a in planned if a.method == row.method and a.start in own]
         if both:
             more = [theirs.burnt - ours.burnt for theirs, ours in both]
             longer = np.median([theirs.seconds / ours.seconds for theirs, ours in both])
