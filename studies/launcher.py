@@ -70,7 +70,9 @@ GROUPS: dict[str, dict[str, Command]] = {
             "studies.stability.command", "Stability", "margins of ZEM/ZEV, and sampled flights"
         ),
         "closed-loop": Command("studies.closed_loop.command", "ClosedLoop", "guidance laws to a given site"),
-        "rigid-plans": Command("studies.rigid_plans", "RigidPlans", "plans for a body that must turn"),
+        "rigid-plans": Command(
+            "studies.rigid_plans.command", "RigidPlans", "plans for a body that must turn"
+        ),
         "calibrate": Command(
             "studies.calibrate", "Calibration", "settings that give the paper's Single Divert"
         ),

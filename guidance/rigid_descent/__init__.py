@@ -12,16 +12,23 @@ if TYPE_CHECKING:
     from guidance.rigid_descent.flight import RigidFlight
     from guidance.rigid_descent.plan import RigidPlan
     from guidance.rigid_descent.problem import RigidLandingProblem
-    from guidance.rigid_descent.residuals import RigidResiduals, fly_plan
+    from guidance.rigid_descent.residuals import RigidResiduals, cut_commands, fly_plan
 
 _HOMES = {
     "guidance.rigid_descent.flight": ("RigidFlight",),
     "guidance.rigid_descent.plan": ("RigidPlan",),
     "guidance.rigid_descent.problem": ("RigidLandingProblem",),
-    "guidance.rigid_descent.residuals": ("RigidResiduals", "fly_plan"),
+    "guidance.rigid_descent.residuals": ("RigidResiduals", "cut_commands", "fly_plan"),
 }
 
-__all__ = ["RigidFlight", "RigidLandingProblem", "RigidPlan", "RigidResiduals", "fly_plan"]
+__all__ = [
+    "RigidFlight",
+    "RigidLandingProblem",
+    "RigidPlan",
+    "RigidResiduals",
+    "cut_commands",
+    "fly_plan",
+]
 
 __getattr__, __dir__ = lazy_exports(
     __name__, {name: home for home, names in _HOMES.items() for name in names}

@@ -113,21 +113,23 @@ def fly_plan(flight: RigidFlight, problem: RigidLandingProblem, parts: int = 1) 
         start, with the flight's attitude or thrust only where these are free.
     """
     body = problem.body
-    shares = np.linspace(0.0, 1.0, parts + 1)
-
-    def cut(commands: Array) -> Array:
-        first, last = commands[:, None, 0], commands[:, None, 1]
-        at = first + shares[None, :, None] * (last - first)
-        return np.stack([at[:, :-1], at[:, 1:]], axis=2).reshape(-1, 2, 3)
-
     start = problem.state.as_array()
     if problem.free_attitude:
         start[6:10] = flight.attitude[0]
     if problem.free_thrust:
         start[14:17] = flight.thrust[0]
     durations = np.repeat(np.diff(flight.time) / parts, parts)
-    thrust, torque = cut(flight.thrust_commands(body.engine_lag)), cut(flight.torque_commands())
+    thrust = cut_commands(flight.thrust_commands(body.engine_lag), parts)
+    torque = cut_commands(flight.torque_commands(), parts)
     return fly_intervals(start, thrust, torque, durations, body.numbers(problem.gravity))
+
+
+def cut_commands(commands: Array, parts: int) -> Array:
+    """Linear commands of K intervals, shape (K, 2, 3), with each interval cut in equal parts."""
+    shares = np.linspace(0.0, 1.0, parts + 1)
+    first, last = commands[:, None, 0], commands[:, None, 1]
+    at = first + shares[None, :, None] * (last - first)
+    return np.stack([at[:, :-1], at[:, 1:]], axis=2).reshape(-1, 2, 3)
 
 
 def _turn_between(first: Array, second: Array) -> Array:

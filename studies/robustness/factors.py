@@ -230,7 +230,8 @@ _GROUPS = ("all", "navigation")
 def choose_factors(wanted: Sequence[str], preset: Preset) -> tuple[Factor, ...]:
     """Factors of the given names, in the table's order, each once.
 
-    `all` is every one that the preset has, `navigation` every sensor of a filter, and the start.
+    `all` is every one that the preset has, `navigation` every sensor of its filter, and the start; a preset
+    without a filter refuses these when they are flown.
 
     Raises:
         ValueError: there is no such factor, or none was given.
@@ -240,10 +241,11 @@ def choose_factors(wanted: Sequence[str], preset: Preset) -> tuple[Factor, ...]:
     for name in wanted:
         if name not in (*_GROUPS, *FACTORS):
             raise ValueError(unknown_name("factor", name, (*_GROUPS, *FACTORS)))
+    sensors = [f for f in NAVIGATION_FACTORS if f.applies(preset) or preset.navigation is None]
     return tuple(
         factor
         for factor in FACTORS.values()
         if factor.name in wanted
         or ("all" in wanted and factor.applies(preset))
-        or ("navigation" in wanted and factor in NAVIGATION_FACTORS)
+        or ("navigation" in wanted and factor in sensors)
     )

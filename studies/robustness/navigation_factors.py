@@ -5,6 +5,7 @@ The filter is told each number, so it stays honest: what a level costs is what s
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Literal
 
@@ -13,7 +14,7 @@ from hda.navigation.system import NavigationSystem
 from hda.task.presets import Preset
 from studies.robustness.factor import Factor
 
-Sensor = Literal["inertial", "altimeter", "velocimeter", "terrain", "site"]
+Sensor = Literal["inertial", "gyroscope", "altimeter", "velocimeter", "terrain", "site"]
 """A sensor's field in `NavigationSystem`."""
 
 _MICRO_G = 1e-6 * STANDARD_GRAVITY
@@ -81,6 +82,20 @@ NAVIGATION_FACTORS: tuple[Factor, ...] = (
         1e-3,
     ),
     _sensor_factor(
+        ("gyroscope", "noise"),
+        "gyroscope-noise",
+        "angle random walk of the gyroscope (1 sigma) [deg/sqrt(h)]",
+        (7.0, 0.7, 0.0),
+        math.radians(1.0) / 60.0,
+    ),
+    _sensor_factor(
+        ("gyroscope", "bias"),
+        "gyroscope-bias",
+        "bias of the gyroscope about each axis (1 sigma) [deg/h]",
+        (1000.0, 100.0, 10.0, 0.0),
+        math.radians(1.0) / 3600.0,
+    ),
+    _sensor_factor(
         ("altimeter", "noise"), "altimeter-noise", "noise of the altimeter (1 sigma) [m]", (10.0, 1.0, 0.01)
     ),
     _sensor_factor(
@@ -142,4 +157,4 @@ NAVIGATION_FACTORS: tuple[Factor, ...] = (
         (5.0, 1.0, 0.0),
     ),
 )
-"""Every sensor of `hda.navigation.sensors` but the gyroscope of a body, and the start."""
+"""Every sensor of `hda.navigation.sensors`, and the start; only a body has the gyroscope."""

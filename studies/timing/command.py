@@ -27,12 +27,13 @@ from studies.campaign.journal import open_journal
 from studies.campaign.provenance import describe_run, identify_run, write_provenance
 from studies.campaign.run_options import FolderOptions
 from studies.columns import console_table, write_csv, write_markdown
+from studies.peers.openscvx_process import OPENSCVX_PACKAGE, demand_openscvx, openscvx_version
 from studies.timing.answer_times import AnswerBatch, AnswerTime, measure_answers, time_new_processes
 from studies.timing.conclusions import conclude
 from studies.timing.gfold_peer import PEER_METHOD, gfold_present
 from studies.timing.measures import Call, Summary, measure_calls, name_processor, summarize_calls
 from studies.timing.methods import Case, paper_cases, reference_cases, timed_methods
-from studies.timing.openscvx_peer import OPENSCVX_PACKAGE, open_openscvx, openscvx_version
+from studies.timing.openscvx_peer import open_openscvx
 from studies.timing.qoco_peer import QOCO_PACKAGE, qoco_present
 from studies.timing.table import ANSWER_COLUMNS, CALL_COLUMNS, SUMMARY_COLUMNS
 
@@ -83,9 +84,7 @@ def find_peers(options: Timing) -> dict[str, str | None]:
         OSError: there is no such interpreter.
     """
     named = options.openscvx_python
-    openscvx = openscvx_version(named or Path(sys.executable))
-    if named is not None and openscvx is None:
-        raise ValueError(f"openscvx_python: {named} has no {OPENSCVX_PACKAGE}")
+    openscvx = openscvx_version(Path(sys.executable)) if named is None else demand_openscvx(named)
     return {
         PEER_METHOD: version(PEER_METHOD) if gfold_present() else None,
         QOCO_PACKAGE: version(QOCO_PACKAGE) if qoco_present() else None,

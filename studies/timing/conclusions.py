@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from studies.bench.speed_ratios import FREE_TO_FIXED_LIMIT
+from studies.peers.openscvx_process import FIRST_ORDER_HOLD, OPENSCVX_METHOD
 from studies.timing.gfold_peer import PEER_METHOD
 from studies.timing.measures import Call, Summary
 from studies.timing.methods import FATROP_METHOD, IPOPT_METHOD, OWN_METHOD, PEER_NODES, Method
-from studies.timing.openscvx_peer import FIRST_ORDER_HOLD, OPENSCVX_METHOD
 from studies.timing.openscvx_worker import WEIGHTS
 from studies.timing.qoco_peer import CLARABEL_METHOD, QOCO_METHOD
 

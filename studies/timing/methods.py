@@ -17,8 +17,9 @@ from guidance.pdg.solve import DEFAULT_NODES, METHODS, PlanningMethod
 from guidance.reference.casadi_planner import plan_casadi
 from guidance.reference.nonlinear_program import NonlinearSolver, fatrop_present
 from hda.task.scenario import sample_scenario
+from studies.peers.openscvx_process import OPENSCVX_METHOD
 from studies.timing.gfold_peer import PEER_METHOD, gfold_present, plan_gfold
-from studies.timing.openscvx_peer import OPENSCVX_METHOD, OpenscvxPlanner
+from studies.timing.openscvx_peer import OpenscvxPlanner
 from studies.timing.qoco_peer import (
     CLARABEL_METHOD,
     QOCO_METHOD,

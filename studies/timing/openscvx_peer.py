@@ -9,44 +9,21 @@ from __future__ import annotations
 
 import json
 import math
-import subprocess
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO
 
 import numpy as np
 
 from guidance.descent.plan import Plan, PlanStatus
 from guidance.descent.problem import LandingProblem
 from guidance.descent.trajectory import Trajectory
+from studies.peers.openscvx_process import OPENSCVX_METHOD, WorkerProcess, open_worker, serving_code
 from studies.timing.first_time import first_time
 
-OPENSCVX_PACKAGE = "openscvx"
-OPENSCVX_METHOD = "OpenSCvx"
-FIRST_ORDER_HOLD = (
-    "Version 0.5.2 blends its controls between nodes up to n/(n - 1) in place of 1 (its issue 584), so that "
-    "what it integrates is not the thrust that it gives at the nodes."
-)
-"""Why its plans miss when they are flown."""
-_VERSION = f"from importlib.metadata import version; print(version({OPENSCVX_PACKAGE!r}))"
-_SERVE = (
-    f"import sys; sys.path.insert(0, {str(Path(__file__).parent)!r}); "
-    "import openscvx_worker; del sys.path[0]; openscvx_worker.serve()"
-)
+_SERVE = serving_code(Path(__file__).with_name("openscvx_worker.py"))
 _WIDTHS = {"time": (), "position": (3,), "velocity": (3,), "mass": (), "thrust": (3,)}
-
-
-def openscvx_version(python: Path) -> str | None:
-    """Version of the package that an interpreter has; None if it has none.
-
-    Raises:
-        OSError: there is no such interpreter.
-    """
-    asked = subprocess.run([str(python), "-c", _VERSION], capture_output=True, text=True, timeout=60)
-    return asked.stdout.strip() if asked.returncode == 0 else None
 
 
 def write_case(problem: LandingProblem, nodes: int, time_of_flight: float | None) -> str:
@@ -114,20 +91,15 @@ def _failed(problem: LandingProblem, words: str) -> Plan:
 
 @dataclass(eq=False)
 class OpenscvxPlanner:
-    """Plans by the package in a process of its own, begun when the first is asked for (`open_openscvx`).
+    """Plans by the package in a process of its own (`open_openscvx`).
 
     Attributes:
-        python: interpreter that has the package.
-        worker: what runs there.
-        said: file of what the process prints beside its answers.
+        worker: the process.
         processor: [s] processor time of all answers so far.
     """
 
-    python: Path
-    worker: str
-    said: IO[str]
+    worker: WorkerProcess
     processor: float = 0.0
-    _process: subprocess.Popen[str] | None = None
 
     def clock(self) -> float:
         """[s] processor time of all answers so far."""
@@ -135,53 +107,21 @@ class OpenscvxPlanner:
 
     def plan(self, problem: LandingProblem, nodes: int, time_of_flight: float | None = None) -> Plan:
         """Least propellant to the target; a worker that died is a plan without a flight, and begun anew."""
-        line = self._exchange(write_case(problem, nodes, time_of_flight))
+        line = self.worker.ask(write_case(problem, nodes, time_of_flight))
         if not line:
-            self.close()
-            self.said.seek(0)
-            return _failed(problem, f"the worker ended: {self.said.read().strip()[-300:]}")
+            return _failed(problem, f"the worker ended: {self.worker.last_words()}")
         plan, processor = read_answer(line, problem, nodes)
         self.processor += processor
         return plan
 
-    def _exchange(self, case: str) -> str:
-        """Send a line and wait for one; empty if the worker ended."""
-        if self._process is None:
-            self._process = subprocess.Popen(
-                [str(self.python), "-c", self.worker],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=self.said,
-                text=True,
-            )
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
-        try:
-            self._process.stdin.write(case + "\n")
-            self._process.stdin.flush()
-        except BrokenPipeError:
-            return ""
-        return self._process.stdout.readline()
-
-    def close(self) -> None:
-        """End the process, if there is one."""
-        if self._process is not None:
-            self._process.kill()
-            self._process.communicate()
-        self._process = None
-
 
 @contextmanager
-def open_openscvx(python: Path, worker: str = _SERVE) -> Iterator[OpenscvxPlanner]:
+def open_openscvx(python: Path, code: str = _SERVE) -> Iterator[OpenscvxPlanner]:
     """A planner whose process ends with the block.
 
     Args:
         python: interpreter that has the package.
-        worker: Python that answers lines of cases there.
+        code: Python that answers lines of cases there.
     """
-    with tempfile.TemporaryFile("w+") as said:
-        planner = OpenscvxPlanner(python, worker, said)
-        try:
-            yield planner
-        finally:
-            planner.close()
+    with open_worker(python, code) as worker:
+        yield OpenscvxPlanner(worker)

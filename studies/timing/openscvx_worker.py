@@ -1,7 +1,8 @@
-"""What runs beside OpenSCvx, in the interpreter that has it: cases come in as JSON lines, flights go out.
+"""Programmes of OpenSCvx for the landing of a point mass, in the interpreter that has the package.
 
-It needs nothing of these packages. A case is stated in units of its own (the distance, the start mass, the
-full thrust), so that one compiled programme serves every case with the same limits: numbers are parameters.
+It needs nothing of these packages (`studies.peers.openscvx_serving` brings the cases). A case is stated in
+units of its own (the distance, the start mass, the full thrust), so that one compiled programme serves every
+case with the same limits: numbers are parameters.
 The thrust has its size as a control of its own, which bounds it (lossless convexification); the share of the
 propellant that is burnt stands in place of the mass. Controls are linear between equally spaced nodes.
 """
@@ -9,14 +10,9 @@ propellant that is burnt stands in place of the mass. Controls are linear betwee
 from __future__ import annotations
 
 import importlib
-import importlib.metadata
-import json
 import math
-import os
-import sys
-import time
 from collections.abc import Sequence
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 
@@ -25,8 +21,7 @@ WEIGHTS = {"lam_cost": 1.0, "lam_vc": 100.0, "lam_prox": 1e-3}
 
 With its default weights (0.01, 1, 0.1) it calls flights converged that burn kilograms too much.
 """
-MOST_SECONDS = 120.0
-"""[s] wall time after which the package stops a case."""
+_MOST_SECONDS = 120.0  # of wall time, after which the package stops a case
 _BOX = 4.0  # greatest scaled speed; twice the greatest scaled distance
 _LONGEST = 12.0  # scaled time of flight
 _LOOSE = {"least_thrust": [0.0], "pointing_cosine": [-1.0], "glide_slope": [10.0], "speed_limit": [10.0]}
@@ -85,7 +80,7 @@ class Programme:
             controls=[self._thrust, self._size],
             N=nodes,
             time=self._time,
-            algorithm={**WEIGHTS, "t_max": MOST_SECONDS},
+            algorithm={**WEIGHTS, "t_max": _MOST_SECONDS},
             float_dtype="float64",
         )
         self.problem.settings.dev.printing = False
@@ -148,25 +143,11 @@ def _bounded(variable: Any, low: Sequence[float], high: Sequence[float]) -> Any:
     return variable
 
 
-def answer_case(programmes: dict[Any, Programme], case: dict[str, Any]) -> dict[str, Any]:
-    """The answer to one case; an exception is told, not raised."""
-    started = time.process_time()
-    try:
-        limits = tuple(name for name in _LOOSE if case[name] is not None)
-        key = (case["nodes"], case["free"], limits)
-        if key not in programmes:
-            programmes[key] = Programme(*key)
-        answer = programmes[key].solve(case)
-    except Exception as error:
-        answer = {"error": f"{type(error).__name__}: {error}"}
-    return {**answer, "processor": time.process_time() - started}
+def name_programme(case: dict[str, Any]) -> tuple[int, bool, tuple[str, ...]]:
+    """Mesh, whether the time of flight is free, and the limits that are set: the rest are numbers."""
+    return case["nodes"], case["free"], tuple(name for name in _LOOSE if case[name] is not None)
 
 
-def serve() -> None:
-    """Answer the JSON lines of stdin on stdout until it is closed; what else is printed goes to stderr."""
-    answers: IO[str] = os.fdopen(os.dup(1), "w")
-    os.dup2(2, 1)
-    programmes: dict[Any, Programme] = {}
-    for line in sys.stdin:
-        answers.write(json.dumps(answer_case(programmes, json.loads(line))) + "\n")
-        answers.flush()
+def build_programme(case: dict[str, Any]) -> Programme:
+    """The programme that serves a case."""
+    return Programme(*name_programme(case))

@@ -1,4 +1,4 @@
-"""Flights whose bytes are kept, of five presets without a body (`PRESETS`): no work on bodies may move them.
+"""Flights whose bytes are kept, of six presets without a body (`PRESETS`): no work on bodies may move them.
 
 `PYTHONPATH=. python tests/studies/flown_bytes.py` flies them and writes flown_bytes.json anew. That belongs
 to a change that moves flights on purpose, and the change log says so.
@@ -26,7 +26,7 @@ from hda.task.scenario import sample_scenario
 assert rl.__doc__
 KEPT = Path(__file__).with_name("flown_bytes.json")
 EPISODES = 3
-PRESETS = ("paper", "hard", "partial", "lidar", "navigated")
+PRESETS = ("paper", "hard", "partial", "lidar", "lidar-coarse", "navigated")
 POLICIES = ("single-divert", "nearest-safe+convex", "hazard-aware")
 FLIGHTS = [(preset, policy) for preset in PRESETS for policy in POLICIES] + [("paper", "td3")]
 

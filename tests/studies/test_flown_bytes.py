@@ -1,4 +1,4 @@
-"""Five presets without a body, those of `flown_bytes.PRESETS`, keep their bytes, whatever is done for bodies.
+"""Six presets without a body, those of `flown_bytes.PRESETS`, keep their bytes, whatever is done for bodies.
 
 Where processor and versions are those of `flown_bytes.json`, every digest must be equal. Elsewhere the last
 bits may differ (docs/reference/versions.md), and a turned cell of a map may lead to another site: there each

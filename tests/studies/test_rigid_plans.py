@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from studies import rigid_plans
 from studies.campaign.claimed_folder import FolderError
-from studies.rigid_plans import METHODS, PlannedStart, RigidPlans, conclude, study_rigid_plans, sum_up
+from studies.rigid_plans import RigidPlans, starts, study_rigid_plans
+from studies.rigid_plans.starts import METHODS, PlannedStart, conclude, sum_up
 
 FIRST, SECOND = METHODS
 
@@ -70,6 +70,7 @@ def test_the_methods_are_compared_where_both_have_a_flight() -> None:
     [
         ({"starts": 0}, "starts must be at least 1"),
         ({"nodes": 4}, "nodes must be at least 5"),
+        ({"peer_starts": 0}, "peer_starts must be at least 1"),
         ({"preset": "papr"}, "did you mean paper"),
     ],
 )
@@ -92,7 +93,7 @@ def test_a_run_goes_on_without_planning_again(tmp_path: Path, monkeypatch: pytes
     def refuse(*_arguments: object, **_options: object) -> None:
         raise AssertionError("it was planned again")
 
-    monkeypatch.setattr(rigid_plans, "solve_pdg_6dof", refuse)
+    monkeypatch.setattr(starts, "solve_pdg_6dof", refuse)
     with pytest.raises(FolderError, match="holds"):
         study_rigid_plans(options)
     study_rigid_plans(replace(options, resume=True))

@@ -43,7 +43,7 @@ def home(factor: Factor) -> Preset:
 @pytest.mark.parametrize("factor", FACTORS.values(), ids=lambda factor: factor.name)
 def test_the_own_value_changes_nothing(factor: Factor, preset: Preset) -> None:
     if not factor.applies(preset):
-        with pytest.raises(ValueError, match=r"measures|filter"):
+        with pytest.raises(ValueError, match=r"measures|filter|no navigation sensor"):
             factor.nominal(preset)
         return
     same = flat(factor.vary(preset, factor.nominal(preset)))
@@ -172,10 +172,31 @@ def test_a_wrong_option_is_named(options: dict, message: str) -> None:
 
 def test_the_sensors_of_a_filter_are_chosen_together() -> None:
     _, points = plan_points(Robustness(levels=1, preset="navigated", factors=("navigation",)))
-    assert len(points) == 1 + len(NAVIGATION_FACTORS)
+    assert len(points) == 1 + sum(factor.applies(PRESETS["navigated"]) for factor in NAVIGATION_FACTORS)
     assert all(point.study.preset.navigation != points[0].study.preset.navigation for point in points[1:])
+    _, turning = plan_points(Robustness(levels=1, preset="rigid-body", factors=("navigation",)))
+    gained = {point.label.split("/")[0] for point in turning} - {
+        point.label.split("/")[0] for point in points
+    }
+    assert gained == {"gyroscope-noise", "gyroscope-bias"}
     with pytest.raises(ValueError, match="'lidar' has no navigation filter"):
         plan_points(Robustness(levels=1, preset="lidar", factors=("navigation",)))
+
+
+@pytest.mark.parametrize("name", ["gyroscope-noise", "gyroscope-bias"])
+def test_only_a_body_that_turns_has_a_gyroscope(name: str) -> None:
+    """Levels are in deg/sqrt(h) and deg/h, and 0 is a gyroscope that does not err."""
+    factor, body = FACTORS[name], PRESETS["rigid-body"]
+    assert [preset.name for preset in PRESETS.values() if factor.applies(preset)] == ["rigid-body"]
+    assert factor.nominal(body) == pytest.approx({"gyroscope-noise": 0.07, "gyroscope-bias": 1.0}[name])
+    navigation = factor.vary(body, 60.0).navigation
+    assert navigation is not None
+    assert navigation.gyroscope is not None
+    gyroscope = navigation.gyroscope
+    per_hour = {"gyroscope-noise": gyroscope.noise * 60.0, "gyroscope-bias": gyroscope.bias * 3600.0}
+    assert math.degrees(per_hour[name]) == pytest.approx(60.0)
+    with pytest.raises(ValueError, match="'navigated' has no navigation sensor 'gyroscope'"):
+        plan_points(Robustness(levels=1, preset="navigated", factors=(name,)))
 
 
 def test_every_factor_is_planned() -> None:

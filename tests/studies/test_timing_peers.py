@@ -23,6 +23,7 @@ from guidance.convex.scaling import ScaledProblem, scale_problem
 from guidance.descent.problem import LandingProblem
 from guidance.flight_time.time_window import time_window
 from guidance.planning.convex_task import ConvexTask
+from studies.peers.openscvx_process import OPENSCVX_METHOD, openscvx_version
 from studies.timing import command as timing
 from studies.timing.command import Timing, find_peers
 from studies.timing.conclusions import conclude
@@ -30,9 +31,7 @@ from studies.timing.first_time import first_time
 from studies.timing.measures import Call, measure_call, summarize_calls
 from studies.timing.methods import OWN_METHOD, Method, make_case, timed_methods
 from studies.timing.openscvx_peer import (
-    OPENSCVX_METHOD,
     open_openscvx,
-    openscvx_version,
     read_answer,
     write_case,
 )

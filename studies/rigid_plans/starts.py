@@ -1,4 +1,4 @@
-"""Plans for a body that must turn: both methods of `guidance.solve_pdg_6dof` on the same dispersed starts.
+"""Dispersed starts planned by both methods of `guidance.solve_pdg_6dof`, and what their lines say.
 
 Starts are those of a preset's episodes on the tuning tiles, each to its first target, the body upright and at
 rest. A plan is flown open loop by the true motion; one that misses a limit has no flight. Times are of the
@@ -11,53 +11,21 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from time import process_time
 from typing import get_args
 
 import numpy as np
-import tyro
-from rich.console import Console
 from rich.progress import track
 
 from guidance import solve_pdg_6dof
-from guidance.console import tolerate_encoding
 from guidance.rigid_body import DEFAULT_BODY
 from guidance.rigid_descent import RigidPlan
-from guidance.successive.solve import DEFAULT_NODES, FEWEST_NODES, RigidPlanningMethod
-from guidance.validation import finite_number
-from hda.task.presets import find_preset
+from guidance.successive.solve import RigidPlanningMethod
 from hda.task.scenario import sample_scenario
-from studies.campaign.command_line import open_folder, resumable
-from studies.campaign.journal import Journal, open_journal
-from studies.campaign.provenance import describe_run, identify_run, write_provenance
-from studies.campaign.run_options import FolderOptions
-from studies.columns import Column, console_table, write_csv, write_markdown
+from studies.campaign.journal import Journal
+from studies.columns import Column
 
-_PRODUCTS = ("plans.csv", "table.csv", "table.md", "provenance.json", "conclusions.txt")
 METHODS: tuple[RigidPlanningMethod, ...] = get_args(RigidPlanningMethod)
-
-
-@dataclass(frozen=True, kw_only=True)
-class RigidPlans(FolderOptions):
-    """Command line of the study.
-
-    Attributes:
-        starts: how many, each planned by both methods.
-        preset: whose start conditions they are drawn from.
-        nodes: of each plan.
-    """
-
-    starts: int = 100
-    preset: str = "paper"
-    nodes: int = DEFAULT_NODES
-    out: Path = Path("results/rigid-plans")
-
-    def __post_init__(self) -> None:
-        """Check every option."""
-        finite_number("starts", self.starts, at_least=1)
-        finite_number("nodes", self.nodes, at_least=FEWEST_NODES)
-        find_preset(self.preset)
 
 
 @dataclass(frozen=True)
@@ -141,16 +109,16 @@ COLUMNS: tuple[Column[MethodRow], ...] = (
 """The methods: table.csv, table.md and the console read this list."""
 
 
-def plan_start(start: int, method: RigidPlanningMethod, options: RigidPlans) -> PlannedStart:
+def plan_start(start: int, method: RigidPlanningMethod, preset: str, nodes: int) -> PlannedStart:
     """Plan the start of a preset's episode on the tuning tiles to its first target, and fly the plan."""
-    scenario = sample_scenario(options.preset, 0, start, "tuning")
+    scenario = sample_scenario(preset, 0, start, "tuning")
     begun = process_time()
     plan = solve_pdg_6dof(
         scenario.initial_state,
         scenario.nominal_target,
         replace(DEFAULT_BODY, lander=scenario.preset.lander),
         gravity=scenario.preset.gravity,
-        nodes=options.nodes,
+        nodes=nodes,
         method=method,
         throw=False,
     )
@@ -173,16 +141,16 @@ def _row(start: int, method: str, seconds: float, plan: RigidPlan) -> PlannedSta
     )
 
 
-def plan_all(options: RigidPlans, journal: Journal[PlannedStart]) -> list[PlannedStart]:
+def plan_all(starts: int, preset: str, nodes: int, journal: Journal[PlannedStart]) -> list[PlannedStart]:
     """Plan every start by each method in turn; what the journal has is not planned again."""
     for method in METHODS:
-        if any(journal.find((method, start)) is None for start in range(options.starts)):
-            plan_start(options.starts, method, options)  # compiled and assembled on first use: not counted
+        if any(journal.find((method, start)) is None for start in range(starts)):
+            plan_start(starts, method, preset, nodes)  # compiled and assembled on first use: not counted
     out = []
-    for start in track(range(options.starts), "plans", transient=True):
+    for start in track(range(starts), "plans", transient=True):
         for method in METHODS:
             key = (method, start)
-            out.append(journal.finish(key, lambda s=start, m=method: plan_start(s, m, options)))
+            out.append(journal.finish(key, lambda s=start, m=method: plan_start(s, m, preset, nodes)))
     return out
 
 
@@ -218,40 +186,3 @@ def conclude(plans: Sequence[PlannedStart]) -> list[str]:
             f"more than {second}, {float(np.median(both)):+.3f} in the median."
         )
     return words
-
-
-def study_rigid_plans(options: RigidPlans) -> list[MethodRow]:
-    """Plan, and write tables, every plan, conclusions.txt and provenance.json.
-
-    Raises:
-        ValueError: the folder holds another study, or `resume` and `overwrite` are both given.
-        OSError: the folder cannot be written.
-    """
-    out, console = open_folder(options.out), Console(width=max(Console().width, 130))
-    decided = {"preset": options.preset, "nodes": options.nodes}
-    identity = identify_run(Path(__file__), decided)
-    with open_journal(out, PlannedStart, _PRODUCTS, identity, options.existing) as journal:
-        plans = plan_all(options, journal)
-        rows, words = [sum_up(method, plans) for method in METHODS], conclude(plans)
-        write_csv(out / "plans.csv", PLAN_COLUMNS, plans)
-        write_csv(out / "table.csv", COLUMNS, rows)
-        write_markdown(out / "table.md", COLUMNS, rows)
-        (out / "conclusions.txt").write_text("\n".join(words) + "\n")
-        write_provenance(out / "provenance.json", {**describe_run(options), "work": journal.describe()})
-    title = f"a body that must turn: {options.starts} starts of {options.preset}"
-    console.print(console_table(COLUMNS, rows, title))
-    for sentence in words:
-        console.print(f"- {sentence}", markup=False, highlight=False)
-    console.print(f"results in {out}")
-    return rows
-
-
-def main() -> None:
-    """Command line; a wrong option is one line on stderr and exit code 2."""
-    tolerate_encoding()
-    with resumable():
-        study_rigid_plans(tyro.cli(RigidPlans, description=__doc__))
-
-
-if __name__ == "__main__":
-    main()

@@ -1,0 +1,307 @@
+"""OpenSCvx beside `solve_pdg_6dof`: the problems, the flight that judges both, and the talk with its process.
+
+What needs the package itself runs where it is installed (extra `peers`); nothing else does.
+"""
+
+import json
+import math
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from guidance import solve_pdg_6dof
+from guidance.rigid_body.motion import fly_intervals
+from guidance.rigid_descent import RigidPlan
+from studies.peers.openscvx_process import open_worker, openscvx_version
+from studies.rigid_plans import RigidPlans, study_rigid_plans
+from studies.rigid_plans.commanded_flight import CommandedFlight, fly_commanded, fly_in_air, limit_excess
+from studies.rigid_plans.openscvx_body import (
+    SERVE_BODY,
+    OpenscvxSettings,
+    Weights,
+    ask_openscvx,
+    read_body_answer,
+    write_body_case,
+)
+from studies.rigid_plans.peer_answers import HELD, SHIPPED, measure_flight
+from studies.rigid_plans.peer_problems import (
+    EXAMPLE_BODY,
+    PeerProblem,
+    Surroundings,
+    published_example,
+    shared_example,
+    start_problem,
+)
+from studies.rigid_plans.peer_table import NO_FLIGHT, OWN_METHOD, PeerAnswer, conclude_peers, sum_up_peers
+
+HERE = Path(sys.executable)
+OPENSCVX = openscvx_version(HERE)
+STILL = Surroundings((0.0, 0.0, 0.0), 0.0, 0.0)
+NUMBERS = EXAMPLE_BODY.numbers((0.0, 0.0, -1.0))
+LINEAR = OpenscvxSettings("linear", 31, "FOH", 2, Weights(1.0, 1.0, 1.0, 1e-3))
+with_openscvx = pytest.mark.skipif(OPENSCVX is None, reason="OpenSCvx is not installed (extra `peers`)")
+
+
+def at_height(height: float, velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> np.ndarray:
+    """An upright state of the example's body."""
+    return np.array([0.0, 0.0, height, *velocity, 1.0, *[0.0] * 6, 2.0, *[0.0] * 3])
+
+
+def fly_held(start: np.ndarray, force: Any, duration: float, around: Surroundings) -> np.ndarray:
+    thrust = np.broadcast_to(np.array(force, dtype=float), (1, 2, 3)).copy()
+    return fly_in_air(start, thrust, np.zeros((1, 2, 3)), np.array([duration]), NUMBERS, around)[-1]
+
+
+@pytest.fixture(scope="module")
+def own_plan() -> tuple[PeerProblem, RigidPlan]:
+    """A start of ours, planned by ours."""
+    peer = start_problem("paper", 0)
+    asked = peer.problem
+    plan = solve_pdg_6dof(asked.state, asked.target, asked.body, gravity=asked.gravity, nodes=31)
+    return peer, plan
+
+
+@settings(max_examples=10, deadline=None)
+@given(st.lists(st.floats(-0.3, 0.3), min_size=6, max_size=6), st.floats(1.5, 6.5), st.floats(0.1, 1.0))
+def test_without_air_the_motion_is_the_vehicle_s(across: list[float], up: float, duration: float) -> None:
+    start = at_height(5.0, (-1.0, 0.5, -0.7))
+    thrust = np.array([[[*across[:2], up], [*across[2:4], up]], [[*across[3:5], up], [*across[4:6], up]]])
+    torque, durations = 1e-3 * thrust[:, ::-1], np.array([duration, 0.5 * duration])
+    here = fly_in_air(start, thrust, torque, durations, NUMBERS, STILL)
+    there = fly_intervals(start, thrust, torque, durations, NUMBERS)
+    assert here[:, :14] == pytest.approx(there[:, :14], abs=1e-5)
+
+
+def test_a_fall_in_air_follows_its_closed_form() -> None:
+    """v = -V tanh(g t / V), with V^2 = m g / k: no thrust, upright."""
+    drag, duration = 0.125, 3.0
+    end = fly_held(at_height(20.0), 0.0, duration, Surroundings((0.25, 0.25, drag), 0.05, 0.0))
+    most = math.sqrt(2.0 / drag)
+    assert end[5] == pytest.approx(-most * math.tanh(duration / most), rel=1e-8)
+    assert 20.0 - end[2] == pytest.approx(most**2 * math.log(math.cosh(duration / most)), rel=1e-8)
+    assert end[13] == 2.0
+
+
+def test_air_turns_the_body_by_the_arm_of_its_own() -> None:
+    """For a short while: the moment of the force k v^2 at the arm, whatever the engine's arm is."""
+    duration = 1e-3
+    end = fly_held(
+        at_height(20.0, (2.0, 0.0, 0.0)), 0.0, duration, Surroundings((0.25, 0.25, 0.0), 0.05, 0.0)
+    )
+    assert end[11] == pytest.approx(-0.25 * 4.0 * 0.05 / 0.168 * duration, rel=1e-3)
+    assert end[10] == end[12] == 0.0
+    assert end[3] == pytest.approx(2.0 - 0.5 * 4.0 * 0.25 * duration, rel=1e-6)
+
+
+def test_a_leak_is_lost_beside_what_the_engine_burns() -> None:
+    end = fly_held(at_height(20.0), (0.0, 0.0, 3.0), 2.0, replace(STILL, leak=0.01))
+    assert end[13] == pytest.approx(2.0 - 2.0 * (3.0 / 30.0 + 0.01), rel=1e-9)
+
+
+def test_our_own_plan_is_flown_as_its_residuals_say(own_plan: tuple[PeerProblem, RigidPlan]) -> None:
+    """The same commands, start and motion as `RigidPlan.residuals`, and so the same end and excesses."""
+    peer, plan = own_plan
+    flight = CommandedFlight.of_flight(plan.flight, peer.problem.body.engine_lag)
+    path = fly_commanded(flight, peer)
+    landed = np.linalg.norm(path[-1, :3] - peer.problem.target)
+    assert landed == pytest.approx(plan.residuals.landing_position, abs=1e-9)
+    excess, body = limit_excess(path, flight, peer), peer.problem.body
+    assert excess["rate"] == pytest.approx(plan.residuals.rate / body.rate_limit, abs=1e-9)
+    assert excess["tilt"] == pytest.approx(plan.residuals.tilt / body.tilt_limit, abs=1e-9)
+    assert max(excess.values()) < 0.06  # 0.01 rad/s of rate is allowed
+    found = measure_flight(flight, peer)
+    assert found.burnt == pytest.approx(plan.propellant, abs=1e-9)
+    assert found.share == pytest.approx(plan.propellant / 1200.0)
+    assert found.miss < 0.01
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "share"),
+    [
+        ("most thrust", {"max_thrust": 1.5}, 1.0),
+        ("least thrust", {"min_thrust": 4.0, "max_thrust": 5.0}, 0.25),
+    ],
+)
+def test_a_limit_that_is_left_is_told_as_a_share(name: str, change: dict, share: float) -> None:
+    peer = shared_example()
+    lander = replace(EXAMPLE_BODY.lander, **{"min_thrust": 1.0, **change})
+    peer = replace(peer, problem=replace(peer.problem, body=replace(EXAMPLE_BODY, lander=lander)))
+    thrust = np.broadcast_to(np.array([0.0, 0.0, 3.0]), (1, 2, 3)).copy()
+    states = np.tile(at_height(7.5)[:14], (2, 1))
+    flight = CommandedFlight(np.array([0.0, 0.1]), states, thrust, np.zeros((1, 2, 3)))
+    excess = limit_excess(fly_commanded(flight, peer), flight, peer)
+    assert excess[name] == pytest.approx(share)
+    assert excess["gimbal"] == excess["tank"] == excess["altitude"] == 0.0
+
+
+def test_the_example_is_told_with_its_published_numbers() -> None:
+    told = json.loads(write_body_case(published_example(), SHIPPED))
+    assert (told["nodes"], told["hold"], told["looseness"], told["leak"]) == (5, "FOH", 0.1, 0.01)
+    assert told["weights"] == {
+        "lam_cost": 0.01,
+        "lam_vc": 10.0,
+        "lam_prox": 1.0,
+        "ep_tr": 0.005,
+        "ep_vc": 1e-6,
+    }
+    assert told["exhaust_velocity"] == pytest.approx(30.0)
+    assert told["drag"] == [0.25, 0.25, 0.125]  # rho S c / 2 with c = 1 across, 0.5 along
+    assert math.degrees(math.acos(told["gimbal_cosine"])) == pytest.approx(20.0)
+    assert told["torque_limit"] == [0.0, 0.0, 0.0]
+    shared = json.loads(write_body_case(shared_example(), SHIPPED))
+    assert (shared["drag"], shared["leak"], shared["looseness"], shared["speed_limit"]) == (
+        None,
+        0.0,
+        1.0,
+        None,
+    )
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.floats(0.1, 1e4), st.floats(0.1, 100.0), st.floats(0.1, 1e4))
+def test_what_has_no_unit_does_not_depend_on_the_units(length: float, duration: float, mass: float) -> None:
+    peer = start_problem("paper", 1)
+    told = json.loads(write_body_case(replace(peer, length=length, duration=duration, mass=mass), LINEAR))
+    body, weight = peer.problem.body, 1200.0 * 1.62
+    gravity = -told["gravity"][2]
+    assert told["max_thrust"] / (told["mass"] * gravity) == pytest.approx(12000.0 / weight)
+    turning = told["torque_limit"][0] / told["inertia"][0] / told["rate_limit"] ** 2
+    assert turning == pytest.approx(66.0 / 880.0 / body.rate_limit**2)
+    assert told["rate_limit"] * told["engine_lag"] == pytest.approx(body.rate_limit * 0.2)
+    fall = told["velocity"][2] ** 2 / (gravity * told["position"][2])
+    offset = peer.problem.state.position - peer.problem.target
+    assert fall == pytest.approx(peer.problem.state.velocity[2] ** 2 / (1.62 * offset[2]))
+
+
+def answer_of(peer: PeerProblem, plan: RigidPlan, **changes: Any) -> str:
+    """A worker's line that holds a plan, in the peer's units."""
+    length, time, mass = peer.length, peer.duration, peer.mass
+    force = mass * length / time**2
+    told = {
+        "converged": True,
+        "iterations": 9,
+        "time": plan.time / time,
+        "mass": plan.mass / mass,
+        "position": (plan.position - peer.problem.target) / length,
+        "velocity": plan.velocity * time / length,
+        "attitude": plan.attitude,
+        "rates": plan.rates * time,
+        "thrust": plan.thrust / force,
+        "torque": plan.torque / (force * length),
+    }
+    lists = {name: np.asarray(value).tolist() for name, value in told.items()}
+    return json.dumps({**lists, "processor": 0.25, **changes})
+
+
+def test_an_answer_is_the_flight_that_it_tells(own_plan: tuple[PeerProblem, RigidPlan]) -> None:
+    peer, plan = own_plan
+    answer = read_body_answer(answer_of(peer, plan), peer, LINEAR)
+    assert (answer.status, answer.processor, answer.iterations) == ("converged", 0.25, 9)
+    assert answer.flight is not None
+    assert answer.flight.states == pytest.approx(plan.flight.states, abs=1e-9)
+    assert answer.flight.thrust == pytest.approx(plan.flight.thrust_commands(0.0), abs=1e-6)
+    held = read_body_answer(answer_of(peer, plan), peer, replace(LINEAR, hold="ZOH")).flight
+    assert held is not None
+    assert np.array_equal(held.thrust[:, 0], held.thrust[:, 1])
+    assert held.torque[:, 0] == pytest.approx(plan.torque[:-1], abs=1e-9)
+    assert read_body_answer(answer_of(peer, plan, converged=False), peer, LINEAR).status == "not converged"
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"mass": [1.0]}, "mass is no part"),
+        ({"rates": [[math.nan] * 3] * 31}, "rates is no part"),
+        ({"time": [0.0] * 31}, "time does not grow"),
+        ({"position": [[0.0] * 3] * 31}, "starts elsewhere"),
+        ({"error": "it broke"}, "it broke"),
+        ({"thrust": "none"}, "no answer of the worker"),
+    ],
+)
+def test_what_is_no_flight_is_named(
+    own_plan: tuple[PeerProblem, RigidPlan], changes: dict, words: str
+) -> None:
+    answer = read_body_answer(answer_of(*own_plan, **changes), own_plan[0], LINEAR)
+    assert answer.flight is None
+    assert answer.status.startswith("failed")
+    assert words in answer.status
+
+
+def answered(method: str, start: int, burnt: float, seconds: float = 1.0, **changes: Any) -> PeerAnswer:
+    made = PeerAnswer(
+        "p", start, method, "optimal", seconds, 9.0, 7, burnt, burnt / 100.0, 30.0, 0.1, 0.2, 0.0, ""
+    )
+    return replace(made, **changes)
+
+
+def test_lines_and_conclusions_are_of_what_was_planned() -> None:
+    lost = dict(zip(NO_FLIGHT._fields, NO_FLIGHT, strict=True))
+    own = [answered(f"{OWN_METHOD}, 31", start, 20.0 + start, 0.5) for start in range(3)]
+    unsettled = PeerAnswer("p", 0, f"{OWN_METHOD}, 41", "limit reached", 1.0, 1.0, 60, *NO_FLIGHT)
+    theirs = [
+        answered(HELD.name, 0, 20.5, 1.0, excess=0.3, limit="tilt"),
+        answered(HELD.name, 1, 20.75, 3.0, miss=0.7),
+        answered(
+            HELD.name,
+            2,
+            math.nan,
+            8.0,
+            status="not converged",
+            **{k: v for k, v in lost.items() if k != "burnt"},
+        ),
+    ]
+    ours, row = sum_up_peers(own + theirs)
+    assert (ours.flights, ours.share, ours.limit) == (3, 0.21, "")
+    assert (row.count, row.flights, row.seconds, row.miss) == (3, 2, (3.0, 8.0), 0.7)
+    assert (row.excess, row.limit) == (0.3, "tilt")
+    words = conclude_peers([*own, unsettled, *theirs])
+    assert words[:2] == [f"{OWN_METHOD}, 41, p: limit reached.", f"{HELD.name}, p: not converged."]
+    assert "burns -0.2500 to +0.5000 more" in words[2]
+    assert "on 2 that both plan, +0.1250 in the median, and takes 4.0 times as long" in words[2]
+    (alone,) = sum_up_peers(theirs[2:])
+    assert alone.flights == 0
+    assert all(math.isnan(number) for number in (alone.share, alone.miss, alone.speed, alone.excess))
+
+
+@pytest.mark.skipif(OPENSCVX is not None, reason="OpenSCvx is installed")
+def test_the_worker_says_what_it_lacks() -> None:
+    """The real one, in an interpreter without the package."""
+    with open_worker(HERE, SERVE_BODY) as worker:
+        answer = ask_openscvx(worker, shared_example(), HELD)
+    assert answer.status == "failed: ModuleNotFoundError: No module named 'openscvx'"
+    assert answer.processor > 0.0
+
+
+def test_a_worker_that_ends_is_told() -> None:
+    with open_worker(HERE, "import sys; sys.exit('it was too much')") as worker:
+        answer = ask_openscvx(worker, shared_example(), HELD)
+    assert answer.status == "failed: the worker ended: it was too much"
+
+
+def test_an_interpreter_without_the_package_is_named_before_a_folder_is_made(tmp_path: Path) -> None:
+    out = tmp_path / "plans"
+    with pytest.raises(OSError, match="absent"):
+        study_rigid_plans(RigidPlans(openscvx_python=tmp_path / "absent", out=out))
+    if OPENSCVX is None:
+        with pytest.raises(ValueError, match="has no openscvx"):
+            study_rigid_plans(RigidPlans(openscvx_python=HERE, out=out))
+    assert not out.exists()
+
+
+@with_openscvx
+@pytest.mark.slow
+def test_openscvx_plans_its_example_and_flies_it_where_controls_are_held() -> None:
+    peer = shared_example()
+    with open_worker(HERE, SERVE_BODY) as worker:
+        answer = ask_openscvx(worker, peer, HELD)
+    assert answer.status == "converged"
+    assert answer.flight is not None
+    found = measure_flight(answer.flight, peer)
+    assert found.miss < 0.01
+    assert found.burnt > 0.4227  # what ours burns with 31 nodes
