@@ -200,8 +200,8 @@ def test_panels_of_many_presets_stand_three_in_a_row() -> None:
     rows = [point("cheap", 0.8, 55.0, preset=name, on_front=True, ratio="success") for name in presets]
     figure = draw_trade_off(rows, [])
     assert [axes.get_title() for axes in figure.axes] == [f"{name}: policies" for name in presets]
-    places = [axes.get_subplotspec().get_geometry()[:3] for axes in figure.axes if axes.get_subplotspec()]
-    assert places == [(2, 3, k) for k in range(4)]
+    places = [axes.get_subplotspec() for axes in figure.axes]
+    assert [place and place.get_geometry()[:3] for place in places] == [(2, 3, k) for k in range(4)]
     for axes in figure.axes:
         assert str(axes.get_ylabel()).startswith("success [%]")
     legends = [axes.get_legend() for axes in figure.axes]
