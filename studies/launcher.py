@@ -87,7 +87,7 @@ GROUPS: dict[str, dict[str, Command]] = {
         "sample-size": Command("studies.sample_size", "SampleSize", "how many episodes a claim needs"),
     },
     "Measure": {
-        "results": Command("studies.results", "MakeResults", "make the tables of docs/results again"),
+        "results": Command("studies.results.command", "MakeResults", "make the tables of docs/results again"),
         "timing": Command("studies.timing.command", "Timing", "planners against one another, by the clock"),
         "bench": Command("studies.bench.command", "Bench", "speed of the inner loops"),
         "scale": Command("studies.scale", "Scale", "episodes a second by the number of workers"),

@@ -68,7 +68,7 @@ RUNS: dict[str, tuple[list[str], list[str]]] = {
     ),
     "studies.information_bound": (
         [*SMALL, "--looks", "0", "--out", "bounded"],
-        ["bounded/table.csv", "bounded/table.md"],
+        ["bounded/table.csv", "bounded/information-bound.png"],
     ),
     "studies.failures": (["--study", "failing", "--out", "failed"], ["failed/failures.csv"]),
     "studies.looks": (
@@ -107,8 +107,20 @@ RUNS: dict[str, tuple[list[str], list[str]]] = {
         ["timed/timing.csv", "timed/timing.png", "timed/answers/answers.csv"],
     ),
     "studies.trade_off": (
-        [*SMALL, "--presets", "paper", "--weights", "none", "--policies", "no-divert", "--out", "traded"],
-        ["traded/table.csv", "traded/trade-off.png"],
+        [
+            *SMALL,
+            "--presets",
+            "paper",
+            "--weights",
+            "none",
+            "--policies",
+            "no-divert",
+            "--reference",
+            "no-divert",
+            "--out",
+            "traded",
+        ],
+        ["traded/table.csv", "traded/trade-off.png", "traded/standings.md"],
     ),
     "studies.verify": (["flown", "--least", "1", "--workers", "1"], []),
 }

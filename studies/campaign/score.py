@@ -6,6 +6,7 @@ moments (`studies.statistics.moments`). Rows must come in the order of their epi
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 
 from hda.flight.episode_row import MEASURES, RATIOS, EpisodeRow
 from studies.columns import Column, Output
-from studies.statistics.moments import TileMoments, mean_intervals
+from studies.statistics.moments import TileMoments, collect_moments, mean_intervals
 from studies.statistics.paired import paired_ratio_interval
 from studies.statistics.ratios import Interval, clustered_count_interval, wilson_interval
 from studies.statistics.reliability import exact_lower_bound
@@ -145,6 +146,20 @@ def success_drop(reference: Sequence[EpisodeRow], rows: Sequence[EpisodeRow]) ->
         ValueError: there is no row, or not as many of both.
     """
     return paired_ratio_interval([row.success for row in reference], [row.success for row in rows])
+
+
+def propellant_rise(
+    reference: Sequence[EpisodeRow], rows: Sequence[EpisodeRow], confidence: float = 0.95
+) -> Interval:
+    """[%] by how much more of it is burnt, over the episodes that succeed in both, clustered by tile.
+
+    A flight that fails early burns little, so failed ones tell nothing. nan where none succeeds in both.
+    """
+    pairs = [(one, row) for one, row in zip(reference, rows, strict=True) if one.success and row.success]
+    if not pairs:
+        return Interval(math.nan, math.nan, math.nan)
+    more = [row.propellant_percent - one.propellant_percent for one, row in pairs]
+    return mean_intervals(collect_moments(more, [row.tile for _, row in pairs]), 0, confidence)[1]
 
 
 def scaled(interval: Interval, factor: float) -> Interval:

@@ -4,7 +4,7 @@ For each episode whoever knows the whole map and every engine error in advance i
 safe cell undercuts it, by proof, so no policy loses less on average (an information relaxation). A loss is
 the propellant in percent; a failure counts a whole tank. The first bound holds for every policy, the others
 for those that keep one restriction more each. Then come flights on the same episodes: oracle-fuel, and
-hazard-aware that is told the true map at its first, second, ... look, or never.
+hazard-aware that is told the true map at its first, second, ... look, or never. The picture shows them all.
 """
 
 from __future__ import annotations
@@ -31,7 +31,14 @@ from studies.campaign.provenance import describe_run, identify_run, write_proven
 from studies.campaign.run_options import FolderOptions
 from studies.columns import console_table, write_csv, write_markdown
 from studies.information_bound.restrictions import FloorRow, bound_episode, list_restrictions
-from studies.information_bound.table import COLUMNS, StepRow, list_steps, tell_recognition, tell_sight
+from studies.information_bound.table import (
+    COLUMNS,
+    StepRow,
+    list_steps,
+    read_steps,
+    tell_recognition,
+    tell_sight,
+)
 from studies.information_bound.told import check_frame, told_name, told_path
 
 _FIRST, _LAST = "oracle-fuel", "hazard-aware"
@@ -48,6 +55,8 @@ class InformationBound(FolderOptions):
         study_seed: seed of the study; equal seeds give equal tables.
         split: tile split: validation or fresh.
         workers: processes; changes nothing but the time.
+        figures: draw the picture.
+        redraw: draw the picture of the table that stands in the folder, and fly nothing.
     """
 
     preset: str = "paper"
@@ -56,6 +65,8 @@ class InformationBound(FolderOptions):
     study_seed: int = 0
     split: str = "validation"
     workers: int = 2
+    figures: bool = True
+    redraw: bool = False
     out: Path = Path("results/information_bound")
 
     def __post_init__(self) -> None:
@@ -119,6 +130,8 @@ def run_information_bound(options: InformationBound) -> list[StepRow]:
     lines = list_steps(names, floors, {name: flown[name] for name in study.policies})
     write_csv(out / "table.csv", COLUMNS, lines)
     write_markdown(out / "table.md", COLUMNS, lines)
+    if options.figures:
+        draw_picture(out, lines)
     write_provenance(out / "provenance.json", describe_run(options))
     console = Console(width=max(Console().width, 130))
     title = f"{study.preset.name}, {study.split}: {study.episodes} episodes"
@@ -130,6 +143,17 @@ def run_information_bound(options: InformationBound) -> list[StepRow]:
     ):
         console.print(words, highlight=False, markup=False)
     return lines
+
+
+def draw_picture(out: Path, lines: list[StepRow]) -> None:
+    """Draw the steps into the folder.
+
+    Raises:
+        OSError: it cannot be written.
+    """
+    from studies.information_bound.picture import draw_steps
+
+    draw_steps(lines).savefig(out / "information-bound.png", dpi=90)
 
 
 def tell_gap(lines: list[StepRow]) -> str:
@@ -147,5 +171,8 @@ def main() -> None:
     tolerate_encoding()
     with resumable():
         options = tyro.cli(InformationBound, description=__doc__)
-        run_information_bound(options)
+        if options.redraw:
+            draw_picture(options.out, read_steps(options.out / "table.csv"))
+        else:
+            run_information_bound(options)
         Console().print(f"results in {options.out}")

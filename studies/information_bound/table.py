@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import csv
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 
@@ -100,6 +102,42 @@ COLUMNS: tuple[Column[StepRow], ...] = (
     Column("failures", "failures", lambda row: row.failures, 0),
 )
 """A line a step; intervals are clustered by tile."""
+
+
+def read_steps(path: Path) -> list[StepRow]:
+    """The steps of a table that a run has written.
+
+    Raises:
+        ValueError: it is no such table.
+        OSError: it cannot be read.
+    """
+    with path.open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    try:
+        lines = [_read_step(row) for row in rows]
+    except (KeyError, TypeError, ValueError) as error:
+        raise ValueError(f"{path} must hold the table of a finished run of this study") from error
+    kinds = [line.proved for line in lines]
+    if not any(kinds) or all(kinds) or kinds != sorted(kinds, reverse=True):
+        raise ValueError(f"{path} must hold the table of a finished run of this study")
+    return lines
+
+
+def _read_step(row: dict[str, str]) -> StepRow:
+    def number(key: str) -> float:
+        return float(row[key] or math.nan)
+
+    def interval(key: str, stem: str) -> Interval:
+        return Interval(number(key), number(f"{stem}_low"), number(f"{stem}_high"))
+
+    return StepRow(
+        step=row["step"],
+        proved=row["kind"] == "bound",
+        loss=interval("loss_percent", "loss"),
+        rise=interval("rise_points", "rise"),
+        below=interval("below_points", "below"),
+        failures=number("failures"),
+    )
 
 
 def tell_recognition(floors: Sequence[FloorRow]) -> str:

@@ -23,17 +23,17 @@ from studies.campaign.score import (
     PROPELLANT_COLUMN,
     RATIO_COLUMNS,
     Score,
+    propellant_rise,
     scaled,
     score_rows,
     success_drop,
 )
 from studies.columns import Column, Output
-from studies.statistics.moments import collect_moments, mean_intervals
-from studies.statistics.paired import holm_adjust, paired_ratio_interval
-from studies.statistics.ratios import Interval, count_pairs, mcnemar_count_p_value
+from studies.statistics.moments import tiled_mean
+from studies.statistics.paired import decide_leads, paired_ratio_interval
+from studies.statistics.ratios import Interval
 
 _NOTHING = Interval(math.nan, math.nan, math.nan)
-_CHANCE = 0.05  # of a false lead among all pairs of a setting
 
 
 @dataclass(frozen=True)
@@ -66,18 +66,6 @@ def lost_episodes(before: Sequence[EpisodeRow] | None, rows: Sequence[EpisodeRow
     """Episodes that fail here and not in the setting before; without one, those that fail."""
     fine = [True] * len(rows) if before is None else [row.success for row in before]
     return [row.episode for row, was in zip(rows, fine, strict=True) if was and not row.success]
-
-
-def propellant_rise(first: Sequence[EpisodeRow], rows: Sequence[EpisodeRow]) -> Interval:
-    """[%] what a setting costs in propellant, over the episodes that succeed in both, clustered by tile.
-
-    A flight that fails early burns little, so failed ones tell nothing. nan where none succeeds in both.
-    """
-    pairs = [(own, row) for own, row in zip(first, rows, strict=True) if own.success and row.success]
-    if not pairs:
-        return _NOTHING
-    more = [row.propellant_percent - own.propellant_percent for own, row in pairs]
-    return mean_intervals(collect_moments(more, [row.tile for _, row in pairs]), 0)[1]
 
 
 def describe_layer(
@@ -141,20 +129,11 @@ def judge_order(first: int, last: int) -> Verdict:
     return {1: Verdict.KEPT, -1: Verdict.REVERSED, 0: Verdict.LOST}[first * last]
 
 
-def decide_leads(rows: Rows, pairs: Sequence[tuple[str, str]]) -> list[int]:
-    """Who leads in each pair of policies: 1 for the first, -1 for the second, 0 where chance explains it.
-
-    A lead counts where the exact McNemar test, corrected by Holm for all pairs, is below 5 %, and the
-    interval of the difference, clustered by tile, lies off zero.
-    """
-    counts = [count_pairs(_successes(rows[a]), _successes(rows[b])) for a, b in pairs]
-    adjusted = holm_adjust([mcnemar_count_p_value(one) for one in counts])
-    decided = []
-    for (a, b), p in zip(pairs, adjusted, strict=True):
-        lead = _tiled_mean(_successes(rows[a]) - _successes(rows[b]), rows[a])
-        sign = int(lead.low > 0.0) - int(lead.high < 0.0)
-        decided.append(sign if p < _CHANCE else 0)
-    return decided
+def decide_order(rows: Rows, pairs: Sequence[tuple[str, str]]) -> list[int]:
+    """Who leads in each pair of policies: 1 for the first, -1 for the second, 0 where chance explains it."""
+    tiles = [row.tile for row in next(iter(rows.values()))]
+    leads = decide_leads([(_successes(rows[a]), _successes(rows[b])) for a, b in pairs], tiles)
+    return [lead.sign for lead in leads]
 
 
 def compare_order(flown: Mapping[str, Rows]) -> list[PairRow]:
@@ -169,7 +148,7 @@ def compare_order(flown: Mapping[str, Rows]) -> list[PairRow]:
     pairs = [(a, b) if hits[a] >= hits[b] else (b, a) for a, b in combinations(names, 2)]
     if not pairs:
         return []
-    first, last = decide_leads(layers[0], pairs), decide_leads(layers[-1], pairs)
+    first, last = decide_order(layers[0], pairs), decide_order(layers[-1], pairs)
     found = []
     for (better, other), was, stays in zip(pairs, first, last, strict=True):
         leads = tuple(_lead(layer[better], layer[other]) for layer in layers)
@@ -186,13 +165,6 @@ def _lead(better: Sequence[EpisodeRow], other: Sequence[EpisodeRow]) -> Interval
     return paired_ratio_interval(_successes(better), _successes(other))
 
 
-def _tiled_mean(values: NDArray[np.int_], rows: Sequence[EpisodeRow]) -> Interval:
-    """Mean over episodes, clustered by tile; where all are equal nothing shows how tiles differ: no ends."""
-    if np.ptp(values) == 0:
-        return Interval(float(values[0]), math.nan, math.nan)
-    return mean_intervals(collect_moments(values, [row.tile for row in rows]), 0)[1]
-
-
 def extra_fall(first: Rows, last: Rows, policy: str, other: str) -> Interval:
     """By how much more a policy falls than another from one setting to another, episode by episode.
 
@@ -200,7 +172,7 @@ def extra_fall(first: Rows, last: Rows, policy: str, other: str) -> Interval:
         A ratio with its 95 % interval, clustered by tile; without ends where it is the same on all episodes.
     """
     falls = [_successes(first[name]) - _successes(last[name]) for name in (policy, other)]
-    return _tiled_mean(falls[0] - falls[1], last[policy])
+    return tiled_mean(falls[0] - falls[1], [row.tile for row in last[policy]])
 
 
 LAYER_COLUMNS: tuple[Column[LayerRow], ...] = (

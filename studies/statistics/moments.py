@@ -107,3 +107,16 @@ def mean_intervals(moments: Moments, measure: int, confidence: float = 0.95) -> 
     clustered = tiles / max(tiles - 1, 1) * float(between @ between) / episodes**2
     by_tile = student_interval(max(independent, clustered), tiles - 1)
     return student_interval(independent, episodes - 1), by_tile
+
+
+def tiled_mean(values: ArrayLike, tile: ArrayLike) -> Interval:
+    """Mean over episodes, clustered by tile; where all are equal nothing shows how tiles differ: no ends.
+
+    Args:
+        values: shape (n,), at least one.
+        tile: shape (n,), number of the tile of each episode.
+    """
+    held = np.asarray(values, dtype=np.float64)
+    if np.ptp(held) == 0.0:
+        return Interval(float(held[0]), math.nan, math.nan)
+    return mean_intervals(collect_moments(held, tile), 0)[1]

@@ -3,16 +3,36 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from studies.statistics.moments import tiled_mean
 from studies.statistics.ratios import (
     Interval,
     PairCounts,
     count_pairs,
+    mcnemar_count_p_value,
     wilson_interval,
 )
+
+CHANCE = 0.05
+"""Of one false lead or more among all that are asked for together."""
+
+
+@dataclass(frozen=True)
+class Lead:
+    """Which of two success ratios over the same episodes is the greater.
+
+    Attributes:
+        sign: 1 for the first, -1 for the second, 0 where chance explains the difference.
+        holm_p: exact McNemar test, corrected for the number of pairs that were asked for together.
+    """
+
+    sign: int
+    holm_p: float
 
 
 def paired_ratio_interval(first: ArrayLike, second: ArrayLike, confidence: float = 0.95) -> Interval:
@@ -89,3 +109,26 @@ def holm_adjust(p_values: ArrayLike) -> NDArray[np.float64]:
     adjusted = np.empty_like(plain)
     adjusted[order] = np.minimum(np.maximum.accumulate(stepped), 1.0)
     return adjusted
+
+
+def decide_leads(pairs: Sequence[tuple[ArrayLike, ArrayLike]], tile: ArrayLike) -> list[Lead]:
+    """Which ratio of each pair is the greater, over the same episodes.
+
+    A lead counts where the exact McNemar test, corrected by Holm for all pairs, is below CHANCE, and the
+    interval of the difference, clustered by tile, lies off zero.
+
+    Args:
+        pairs: two arrays of booleans or zeros and ones each, shape (n,), episode by episode.
+        tile: shape (n,), number of the tile of each episode.
+
+    Raises:
+        ValueError: an array is empty or holds something else, or the shapes differ.
+    """
+    counts = [count_pairs(first, second) for first, second in pairs]
+    adjusted = holm_adjust([mcnemar_count_p_value(one) for one in counts])
+    found = []
+    for (first, second), p in zip(pairs, adjusted, strict=True):
+        lead = tiled_mean(np.asarray(first, dtype=int) - np.asarray(second, dtype=int), tile)
+        sign = int(lead.low > 0.0) - int(lead.high < 0.0)
+        found.append(Lead(sign if p < CHANCE else 0, float(p)))
+    return found

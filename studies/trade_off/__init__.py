@@ -1,4 +1,4 @@
-"""Safety against propellant, over the weights of `hazard-aware`.
+"""Safety against propellant: policies on each preset, against a reference, and the weights of `hazard-aware`.
 
 `python -m studies.trade_off` is its command. `command` reads the options and runs the study; tables,
 conclusions and pictures stand beside it.

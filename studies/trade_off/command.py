@@ -5,14 +5,16 @@ tuning tiles, as changing them is tuning. The front holds the policies that see 
 them beats in both. The ceiling and the floor are `hindsight`'s: the ratio of episodes in which any policy
 could have known safe ground, and the propellant without which none can land there softly. Where the sensor
 measures ranges there is no ceiling: it sees ground past the square of the look, so the proof does not hold.
+With a reference every policy is held against it on the same episodes: whether it fails more, and where both
+land, whether it burns more.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import tyro
 from rich.console import Console
@@ -34,6 +36,8 @@ from studies.campaign.score import score_rows
 from studies.columns import write_csv, write_markdown
 from studies.statistics.moments import collect_moments, mean_intervals
 from studies.statistics.ratios import wilson_interval
+from studies.trade_off.standings import COLUMNS as STANDING_COLUMNS
+from studies.trade_off.standings import compare_to, tell_standings
 from studies.trade_off.table import BOUNDS_COLUMNS, COLUMNS, Bounds, TradeOffRow, print_trade_off
 from studies.trade_off.weights import SWEEP, sweep_name, sweep_path
 
@@ -49,12 +53,19 @@ class TradeOff(RunOptions):
         weights: weights of hazard-aware to vary; `all` is every one, `none` leaves the sweeps out.
         sweep_episodes: episodes per value of a weight.
         split: tile split of the policies: validation or fresh. Weights are always flown on tuning.
+        ratio: what is set against propellant: safe-site, the paper's, or success, which asks for a soft
+            touchdown too.
+        reference: policy that the others are held against, on every preset; none by default.
+        bounds: work out the ceiling and the floor.
     """
 
     presets: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME ...")] = ("paper", "hard")
     weights: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME ...")] = ("all",)
     episodes: int = 1000
     sweep_episodes: int = 300
+    ratio: Literal["safe-site", "success"] = "safe-site"
+    reference: str | None = None
+    bounds: bool = True
     out: Path = Path("results/trade_off")
 
     def __post_init__(self) -> None:
@@ -89,6 +100,8 @@ def plan_points(options: TradeOff) -> list[Point]:
     for name in options.presets:
         preset = find_preset(name)
         policies, paths = choose_policies(options.policies, preset.name)
+        if options.reference not in (None, *policies):
+            raise ValueError(unknown_name(f"reference on {name}: policy", options.reference, policies))
         study = Study(preset, policies, options.episodes, options.study_seed, options.split, paths)
         points.append(Point(f"{preset.name}/policies", study))
         if pairs:
@@ -99,8 +112,8 @@ def plan_points(options: TradeOff) -> list[Point]:
     return points
 
 
-def score_point(study: Study, rows: Rows) -> list[TradeOffRow]:
-    """Score every policy of a study, and say which are on the front."""
+def score_point(study: Study, rows: Rows, ratio: str = "safe_site") -> list[TradeOffRow]:
+    """Score every policy of a study, and say which are on the front of a ratio and the propellant."""
     changed = {sweep_name(weight, value): (weight, value) for weight, value in choose_weights(("all",))}
     for path in study.paths:
         policy_entry(path)  # registers what is known by path
@@ -109,7 +122,8 @@ def score_point(study: Study, rows: Rows) -> list[TradeOffRow]:
         weight, value = changed.get(name, ("", float("nan")))
         score = score_rows(rows[name])
         privileged = policy_entry(name).privileged
-        scored.append(TradeOffRow(study.preset.name, study.split, name, weight, value, privileged, score))
+        where = study.preset.name, study.split, name
+        scored.append(TradeOffRow(*where, weight, value, privileged, score, ratio=ratio))
     front = find_front(scored)
     return [replace(row, on_front=row.policy in front) for row in scored]
 
@@ -117,9 +131,7 @@ def score_point(study: Study, rows: Rows) -> list[TradeOffRow]:
 def find_front(rows: Sequence[TradeOffRow]) -> set[str]:
     """Policies that see no truth and that none of them beats: as safe on less, or safer on as little."""
     places = {
-        row.policy: (row.score.safe_site.estimate, row.score.propellant.estimate)
-        for row in rows
-        if not row.privileged
+        row.policy: (row.landed.estimate, row.score.propellant.estimate) for row in rows if not row.privileged
     }
     return {
         policy
@@ -156,17 +168,34 @@ def run_trade_off(options: TradeOff) -> tuple[list[TradeOffRow], list[Bounds]]:
     points = plan_points(options)
     out = open_folder(options.out)
     flown = fly_points(out, points, options.existing, options.workers)
-    rows = [row for point in points for row in score_point(point.study, flown[point.label])]
-    bounds = [bound_preset(find_preset(name), options) for name in options.presets]
+    ratio = options.ratio.replace("-", "_")
+    rows = [row for point in points for row in score_point(point.study, flown[point.label], ratio)]
+    bounds = [bound_preset(find_preset(name), options) for name in options.presets if options.bounds]
     write_csv(out / "table.csv", COLUMNS, rows)
     write_markdown(out / "table.md", COLUMNS, rows)
-    write_csv(out / "bounds.csv", BOUNDS_COLUMNS, bounds)
+    if options.bounds:
+        write_csv(out / "bounds.csv", BOUNDS_COLUMNS, bounds)
+    if options.reference is not None:
+        write_standings(options, options.reference, flown)
     if options.figures:
         from studies.trade_off.picture import draw_trade_off
 
         draw_trade_off(rows, bounds).savefig(out / "trade-off.png", dpi=85)
     write_provenance(out / "provenance.json", describe_run(options))
     return rows, bounds
+
+
+def write_standings(options: TradeOff, reference: str, flown: Mapping[str, Rows]) -> None:
+    """Hold the policies of each preset against the reference, write that table, and print what it says."""
+    presets = [
+        compare_to(name, flown[f"{find_preset(name).name}/policies"], reference) for name in options.presets
+    ]
+    lines = [line for preset in presets for line in preset]
+    write_csv(options.out / "standings.csv", STANDING_COLUMNS, lines)
+    write_markdown(options.out / "standings.md", STANDING_COLUMNS, lines)
+    console = Console(width=max(Console().width, 130))
+    for preset in presets:
+        console.print(tell_standings(preset), highlight=False, markup=False)
 
 
 def main() -> None:

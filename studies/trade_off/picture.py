@@ -15,37 +15,47 @@ if TYPE_CHECKING:
 
     from studies.trade_off.table import Bounds, TradeOffRow
 
+_PANELS = 3  # in a row
 _MARKERS = ("o", "s", "D", "^", "v", "P", "X")
 
 
 def draw_trade_off(rows: Sequence[TradeOffRow], bounds: Sequence[Bounds]) -> Figure:
-    """Draw a column per preset: the policies above, the sweeps of the weights below."""
+    """Draw a panel per preset: the policies, and below them the sweeps of the weights where there are any.
+
+    Without sweeps the panels stand three in a row. The floor is drawn where `bounds` has one.
+    """
     from matplotlib.figure import Figure
 
     presets = list(dict.fromkeys(row.preset for row in rows))
     swept = any(row.weight for row in rows)
-    figure = Figure(figsize=(1.5 + 5.4 * len(presets), 4.6 * (1 + swept)), layout="constrained")
-    axes = figure.subplots(1 + swept, len(presets), squeeze=False)
-    for column, preset in enumerate(presets):
+    wide = len(presets) if swept else min(len(presets), _PANELS)
+    high = 2 if swept else -(-len(presets) // wide)
+    figure = Figure(figsize=(1.5 + 5.4 * wide, 4.6 * high), layout="constrained")
+    axes = figure.subplots(high, wide, squeeze=False)
+    for number, preset in enumerate(presets):
+        axis, column = axes.flat[number], number
         own = [row for row in rows if row.preset == preset]
         weights = [row for row in own if row.weight]
         splits = {row.split for row in weights}
-        floor = next(b.floor.estimate for b in bounds if b.preset == preset)
-        _draw_policies(axes[0, column], [r for r in own if not r.weight and r.split not in splits], floor)
-        axes[0, column].set_title(f"{preset}: policies")
+        floor = next((b.floor.estimate for b in bounds if b.preset == preset), None)
+        _draw_policies(axis, [r for r in own if not r.weight and r.split not in splits], floor)
+        axis.set_title(f"{preset}: policies")
         if swept:
             start = next((r for r in own if not r.weight and r.split in splits), None)
             _draw_weights(axes[1, column], weights, start)
             axes[1, column].set_title(f"{preset}: hazard-aware with one weight changed (tuning tiles)")
+    if not swept:
+        for axis in axes.flat[len(presets) :]:
+            axis.remove()
     for row in axes:
-        handles, labels = row[-1].get_legend_handles_labels()
-        row[-1].legend(handles, labels, loc="center left", bbox_to_anchor=(1.02, 0.5), frameon=False)
+        last = next(axis for axis in reversed(row) if axis.figure is not None)
+        last.legend(loc="center left", bbox_to_anchor=(1.02, 0.5), frameon=False)
     return figure
 
 
 def _ends(row: TradeOffRow) -> tuple[list[float], list[float], list[float]]:
-    """Middle, low and high of (propellant, safe site, safe site by tile), in percent."""
-    triples = (row.score.propellant, row.score.safe_site, row.score.safe_site_by_tile)
+    """Middle, low and high of (propellant, the ratio, the ratio by tile), in percent."""
+    triples = (row.score.propellant, row.landed, row.landed_by_tile)
     factors = (1.0, 100.0, 100.0)
     middle, low, high = (
         [factor * getattr(interval, end) for factor, interval in zip(factors, triples, strict=True)]
@@ -74,14 +84,15 @@ def _draw_point(axis: Axes, row: TradeOffRow, color: str, marker: str, label: st
     )
 
 
-def _draw_policies(axis: Axes, rows: Sequence[TradeOffRow], floor: float) -> None:
+def _draw_policies(axis: Axes, rows: Sequence[TradeOffRow], floor: float | None) -> None:
     for k, row in enumerate(rows):
         name = row.policy + (" *" if row.privileged else "")
         _draw_point(axis, row, COLORS[k % len(COLORS)], _MARKERS[k % len(_MARKERS)], name)
     front = sorted(_ends(row)[0][:2] for row in rows if row.on_front)
     axis.step(*np.array(front).T, where="post", color="0.3", linewidth=1.0, linestyle="--", label="front")
-    axis.axvline(floor, color="0.5", linewidth=1.0, linestyle=":", label="floor on propellant")
-    _label(axis)
+    if floor is not None:
+        axis.axvline(floor, color="0.5", linewidth=1.0, linestyle=":", label="floor on propellant")
+    _label(axis, rows[0].ratio)
 
 
 def _draw_weights(axis: Axes, rows: Sequence[TradeOffRow], start: TradeOffRow | None) -> None:
@@ -100,10 +111,10 @@ def _draw_weights(axis: Axes, rows: Sequence[TradeOffRow], start: TradeOffRow | 
             )
     if start is not None:
         _draw_point(axis, start, "black", "*", "default weights")
-    _label(axis)
+    _label(axis, rows[0].ratio)
 
 
-def _label(axis: Axes) -> None:
+def _label(axis: Axes, ratio: str) -> None:
     axis.set_xlabel("propellant burnt [%], mean with Student's interval")
-    axis.set_ylabel("safe site [%], Wilson's interval, thin: by tile")
+    axis.set_ylabel(f"{ratio.replace('_', ' ')} [%], Wilson's interval, thin: by tile")
     axis.grid(alpha=0.25)

@@ -28,6 +28,7 @@ class TradeOffRow:
         privileged: it sees the true map.
         score: every figure with its intervals.
         on_front: no policy of the same preset and split that sees no truth beats it in both.
+        ratio: what is set against the propellant: safe_site or success.
     """
 
     preset: str
@@ -38,6 +39,17 @@ class TradeOffRow:
     privileged: bool
     score: Score
     on_front: bool = False
+    ratio: str = "safe_site"
+
+    @property
+    def landed(self) -> Interval:
+        """The ratio that is set against the propellant, with Wilson's interval."""
+        return getattr(self.score, self.ratio)
+
+    @property
+    def landed_by_tile(self) -> Interval:
+        """The same ratio with the interval clustered by tile."""
+        return getattr(self.score, f"{self.ratio}_by_tile")
 
 
 @dataclass(frozen=True)

@@ -5,11 +5,13 @@ import math
 from dataclasses import replace
 from itertools import pairwise, product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from matplotlib.container import BarContainer, ErrorbarContainer
 
 import guidance
 from guidance.rigid_body.body import DEFAULT_BODY
@@ -24,10 +26,12 @@ from hda.task.rules import Range, StartConditions
 from hda.task.scenario import sample_scenario
 from studies.campaign.claimed_folder import FolderError
 from studies.campaign.monte_carlo import Study
+from studies.columns import write_csv
 from studies.information_bound import Arrival, InformationBound, bound_cheapest, penalised_loss
 from studies.information_bound import run_information_bound as run
 from studies.information_bound.cheapest_landing import prove_cell
 from studies.information_bound.command import plan_study
+from studies.information_bound.picture import draw_steps
 from studies.information_bound.recognition import (
     candidate_tiles,
     log_likelihoods,
@@ -42,8 +46,9 @@ from studies.information_bound.restrictions import (
     list_restrictions,
     safe_places,
 )
-from studies.information_bound.table import flown_losses
+from studies.information_bound.table import COLUMNS, StepRow, flown_losses, read_steps
 from studies.information_bound.told import tell_map, told_path, true_square
+from studies.statistics.ratios import Interval
 
 LANDER, GRAVITY = guidance.PAPER_LANDER, np.array(guidance.MOON_GRAVITY)
 START = guidance.State(np.array([200.0, 100.0, 950.0]), np.array([-8.0, -4.0, -30.0]), 1200.0)
@@ -321,12 +326,93 @@ def test_the_command_writes_the_steps_and_goes_on(tmp_path: Path) -> None:
     assert lines[-1].step == "hazard-aware"
     assert lines[-1].below.estimate == 0.0
     assert lines[0].below.estimate == pytest.approx(sum(line.rise.estimate for line in lines[1:]))
+    assert (options.out / "information-bound.png").read_bytes().startswith(b"\x89PNG")
     table = (options.out / "table.csv").read_bytes()
     assert len(list(csv.DictReader(table.decode().splitlines()))) == len(lines)
     with pytest.raises(FolderError):
         run(options)
     run(replace(options, resume=True))
     assert (options.out / "table.csv").read_bytes() == table
+
+
+_NO = Interval(math.nan, math.nan, math.nan)
+STEPS = [
+    StepRow("every policy", True, Interval(48.0, 47.9, 48.1), _NO, Interval(6.0, 5.9, 6.1), math.nan),
+    StepRow(
+        "touchdown at rest",
+        True,
+        Interval(50.5, 50.3, 50.6),
+        Interval(2.5, 2.4, 2.6),
+        Interval(3.5, 3.4, 3.6),
+        math.nan,
+    ),
+    StepRow(
+        "oracle-fuel",
+        False,
+        Interval(53.0, 52.7, 53.2),
+        Interval(2.5, 2.3, 2.7),
+        Interval(1.0, 0.9, 1.1),
+        0.0,
+    ),
+    StepRow(
+        "hazard-aware",
+        False,
+        Interval(54.0, 53.8, 54.3),
+        Interval(1.0, 0.9, 1.1),
+        Interval(0.0, 0.0, 0.0),
+        2.0,
+    ),
+]
+
+
+def test_the_picture_shows_every_step_and_what_the_difference_consists_of() -> None:
+    (axes,) = draw_steps(STEPS).axes
+    labels = [tick.get_text() for tick in axes.get_yticklabels()]
+    assert labels == ["every policy", "touchdown at rest", "oracle-fuel *", "hazard-aware", "in sum"]
+    bars: list[Any] = [bar for held in axes.containers if isinstance(held, BarContainer) for bar in held]
+    steps = sorted((bar.get_y() + 0.5 * bar.get_height(), bar.get_x(), bar.get_width()) for bar in bars)
+    expected = [(k, STEPS[k - 1].loss.estimate, STEPS[k].rise.estimate) for k in (1, 2, 3)]
+    expected += [(4, 48.0, 5.0), (4, 53.0, 1.0)]  # how it flies, and what it does not know
+    np.testing.assert_allclose(steps, expected, atol=1e-9)
+    points: dict[str, Any] = {
+        str(held.get_label()).split(";")[0]: held
+        for held in axes.containers
+        if isinstance(held, ErrorbarContainer)
+    }
+    for label, proved in (("bound, proved", True), ("flown", False)):
+        own = [line for line in STEPS if line.proved == proved]
+        assert points[label].lines[0].get_xdata().tolist() == [line.loss.estimate for line in own]
+        segments = np.array(points[label].lines[2][0].get_segments())
+        np.testing.assert_allclose(segments[:, 0, 0], [line.loss.low for line in own])
+        np.testing.assert_allclose(segments[:, 1, 0], [line.loss.high for line in own])
+    assert {"+2.50", "+1.00", "how it flies: 5.00 points", "  what it does not know: 1.00"} == {
+        text.get_text() for text in axes.texts
+    }
+
+
+def test_a_table_that_was_written_is_read_as_it_was(tmp_path: Path) -> None:
+    write_csv(tmp_path / "table.csv", COLUMNS, STEPS)
+    read = read_steps(tmp_path / "table.csv")
+    assert [(line.step, line.proved) for line in read] == [(line.step, line.proved) for line in STEPS]
+    for line, other in zip(read, STEPS, strict=True):
+        for name in ("loss", "rise", "below"):
+            ends = list(vars(getattr(other, name)).values())
+            np.testing.assert_allclose(list(vars(getattr(line, name)).values()), ends, rtol=1e-8)
+        np.testing.assert_equal(line.failures, other.failures)
+
+
+@pytest.mark.parametrize(
+    "text", ["", "policy,success\na,1\n", "step,kind\na,bound\n", "only bounds", "the wrong order"]
+)
+def test_another_table_is_refused(text: str, tmp_path: Path) -> None:
+    path = tmp_path / "table.csv"
+    lines = {"only bounds": STEPS[:2], "the wrong order": STEPS[::-1]}
+    if text in lines:
+        write_csv(path, COLUMNS, lines[text])
+    else:
+        path.write_text(text)
+    with pytest.raises(ValueError, match="must hold the table of a finished run of this study"):
+        read_steps(path)
 
 
 @pytest.mark.parametrize("looks", [(2, 1), (1, 1), (-1,)])

@@ -164,7 +164,7 @@ def point(name: str, safe: float, burnt: float, **kind: Any) -> TradeOffRow:
         fallbacks=0,
     )
     named = {"split": "validation", "weight": "", "value": math.nan, "privileged": False, "on_front": False}
-    return TradeOffRow(preset="paper", policy=name, score=score, **{**named, **kind})
+    return TradeOffRow(policy=name, score=score, **{"preset": "paper", **named, **kind})
 
 
 def test_a_trade_off_shows_points_front_and_floor() -> None:
@@ -193,6 +193,20 @@ def test_a_trade_off_shows_points_front_and_floor() -> None:
     front = line_data(axes, "front")
     np.testing.assert_allclose(front, [[55.0, 66.0], [80.0, 95.0]])
     np.testing.assert_allclose(line_data(axes, "floor on propellant")[0], [50.0, 50.0])
+
+
+def test_panels_of_many_presets_stand_three_in_a_row() -> None:
+    presets = ("paper", "hard", "partial", "lidar")
+    rows = [point("cheap", 0.8, 55.0, preset=name, on_front=True, ratio="success") for name in presets]
+    figure = draw_trade_off(rows, [])
+    assert [axes.get_title() for axes in figure.axes] == [f"{name}: policies" for name in presets]
+    places = [axes.get_subplotspec() for axes in figure.axes]
+    assert [place and place.get_geometry()[:3] for place in places] == [(2, 3, k) for k in range(4)]
+    for axes in figure.axes:
+        assert str(axes.get_ylabel()).startswith("success [%]")
+    legends = [axes.get_legend() for axes in figure.axes]
+    assert [legend is not None for legend in legends] == [False, False, True, True]
+    assert set(legend_words(legends[-1])) == {"cheap", "front"}  # no floor where there are no bounds
 
 
 def test_a_swept_weight_is_drawn_below_with_its_values() -> None:

@@ -23,7 +23,7 @@ from studies.realism.layers import (
     PairRow,
     Verdict,
     compare_order,
-    decide_leads,
+    decide_order,
     describe_layer,
     extra_fall,
     judge_order,
@@ -152,7 +152,7 @@ def test_equal_policies_are_hardly_ever_told_apart(row: EpisodeRow) -> None:
     )
     pairs = list(combinations(names, 2))
     told = sum(
-        any(decide_leads(_layer(row, {name: (rng.random(60) < 0.8).tolist() for name in names}), pairs))
+        any(decide_order(_layer(row, {name: (rng.random(60) < 0.8).tolist() for name in names}), pairs))
         for _ in range(40)
     )
     assert told <= 8

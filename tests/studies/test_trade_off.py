@@ -33,14 +33,16 @@ def forgetful_registry(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(registry, "REGISTRY", registry.REGISTRY.copy())
 
 
-def row(name: str, safe: float, burnt: float, privileged: bool = False) -> TradeOffRow:
-    ratio = Interval(safe, safe, safe)
+def row(
+    name: str, safe: float, burnt: float, privileged: bool = False, ratio_name: str = "safe_site"
+) -> TradeOffRow:
+    ratio, other = Interval(safe, safe, safe), Interval(0.5, 0.5, 0.5)
     means: dict[str, Interval] = {name: Interval(burnt, burnt, burnt) for name in MEASURES}
     score = Score(
         episodes=100,
-        safe_site=ratio,
+        safe_site=ratio if ratio_name == "safe_site" else other,
         safe_site_by_tile=ratio,
-        success=ratio,
+        success=ratio if ratio_name == "success" else other,
         success_by_tile=ratio,
         success_at_least=safe,
         success_at_least_by_tile=safe,
@@ -48,12 +50,17 @@ def row(name: str, safe: float, burnt: float, privileged: bool = False) -> Trade
         means_by_tile=means,
         fallbacks=0,
     )
-    return TradeOffRow("paper", "validation", name, "", float("nan"), privileged, score)
+    return TradeOffRow("paper", "validation", name, "", float("nan"), privileged, score, ratio=ratio_name)
 
 
-@given(st.lists(st.tuples(st.integers(0, 5), st.integers(0, 5), st.booleans()), min_size=1, max_size=12))
-def test_the_front_is_what_nothing_open_beats(places: list[tuple[int, int, bool]]) -> None:
-    rows = [row(f"p{k}", safe / 5.0, float(burnt), seen) for k, (safe, burnt, seen) in enumerate(places)]
+@given(
+    st.lists(st.tuples(st.integers(0, 5), st.integers(0, 5), st.booleans()), min_size=1, max_size=12),
+    st.sampled_from(("safe_site", "success")),
+)
+def test_the_front_is_what_nothing_open_beats(places: list[tuple[int, int, bool]], ratio: str) -> None:
+    rows = [
+        row(f"p{k}", safe / 5.0, float(burnt), seen, ratio) for k, (safe, burnt, seen) in enumerate(places)
+    ]
     front = find_front(rows)
     for k, (safe, burnt, seen) in enumerate(places):
         beaten = any(
@@ -106,6 +113,7 @@ def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
                 weights=("commit_time",),
                 episodes=10,
                 sweep_episodes=2,
+                reference="single-divert",
                 workers=1,
                 out=folder,
             )
@@ -128,6 +136,25 @@ def test_policies_fly_validation_and_weights_fly_tuning(out: Path) -> None:
     assert [line["value"] for line in lines if line["weight"] == "commit_time"] == ["0.5", "7.5"]
     assert not any(line["on_front"] == "True" for line in lines if line["policy"] == "oracle")
     assert any(line["on_front"] == "True" for line in lines if line["policy"] == "single-divert")
+
+
+def test_policies_are_held_against_the_reference(out: Path) -> None:
+    with (out / "standings.csv").open() as stream:
+        lines = {line["policy"]: line for line in csv.DictReader(stream)}
+    with (out / "paper" / "policies" / "episodes.csv").open() as stream:
+        rows = list(csv.DictReader(stream))
+    failures = {
+        name: sum(row["success"] == "False" for row in rows if row["policy"] == name) for name in lines
+    }
+    assert list(lines) == ["no-divert", "single-divert", "oracle"]
+    assert (lines["single-divert"]["standing"], lines["single-divert"]["fails_more_points"]) == (
+        "the reference",
+        "",
+    )
+    for name in ("no-divert", "oracle"):
+        more = 100.0 * (failures[name] - failures["single-divert"]) / 10
+        assert float(lines[name]["fails_more_points"]) == pytest.approx(more)
+    assert "| the reference |" in (out / "standings.md").read_text()
 
 
 def test_every_point_leaves_its_rows_and_where_they_come_from(out: Path) -> None:
@@ -177,6 +204,8 @@ def test_the_picture_is_there(out: Path) -> None:
         ({"weights": ("failure_csot",)}, "did you mean failure_cost"),
         ({"weights": ()}, "weights must name at least one"),
         ({"presets": ("papper",)}, "did you mean paper"),
+        ({"reference": "hazard-awar"}, "reference on paper: policy 'hazard-awar'; did you mean hazard-aware"),
+        ({"policies": ("rivals",), "reference": "hazard-aware"}, "reference on paper: policy 'hazard-aware'"),
     ],
 )
 def test_a_wrong_option_is_named(options: dict, message: str) -> None:

@@ -1,8 +1,8 @@
-"""The tables of docs/results, and one of docs/explanation, made again, in the order of need: `make results`.
+"""The tables of the documentation made again, in the order of need: `make results`.
 
 Each is a command of its own, which keeps finished work and goes on with it. What is finished at the present
-commit is written to a journal and not made again. Stopped, the same call goes on. Left out is what needs
-files or packages that are not shipped: runs of training, models of real ground, other planners.
+commit is written to a journal and not made again. Stopped, the same call goes on. What is left out, such as
+what needs files or packages that are not shipped, stands in docs/results/commands.md with its reason.
 """
 
 from __future__ import annotations
@@ -27,103 +27,10 @@ from guidance.validation import unknown_name
 from studies.campaign.command_line import open_folder, resumable
 from studies.campaign.provenance import git_commit
 from studies.campaign.shards import write_durably
+from studies.results.entries import RESULTS
 
 _FINISHED = "finished.json"
 _BEGUN = "begun.json"
-
-
-@dataclass(frozen=True)
-class Result:
-    """One table, or several that one command makes.
-
-    Attributes:
-        page: which shows it, from docs/results.
-        command: what makes it, behind `python -m`.
-        resumable: the command has `--resume`.
-    """
-
-    page: str
-    command: str
-    resumable: bool = True
-
-
-RESULTS: dict[str, Result] = {
-    "comparison": Result("comparison.md", "studies.compare"),
-    "hard": Result(
-        "comparison.md",
-        "studies.compare --preset hard --policies hazard-aware single-divert nearest-safe nearest-safe+convex"
-        " oracle-fuel deferred-decision --out results/hard",
-    ),
-    "reliability": Result(
-        "reliability.md",
-        "studies.compare --split fresh --episodes 2995 --policies hazard-aware single-divert nearest-safe"
-        " nearest-safe+convex oracle-fuel --no-figures --out results/fresh",
-    ),
-    "stability": Result("stability.md", "studies.stability"),
-    "memory": Result("memory.md", "studies.memory", resumable=False),
-    "agents-paper": Result(
-        "learnt-agents.md",
-        "studies.compare --policies nearest-safe nearest-safe+convex hazard-aware --no-figures"
-        " --out results/agents_paper",
-    ),
-    "agents-partial": Result(
-        "learnt-agents.md",
-        "studies.compare --preset partial --policies nearest-safe nearest-safe+convex hazard-aware td3"
-        " --no-figures --out results/agents_partial",
-    ),
-    "agents-lidar": Result(
-        "learnt-agents.md",
-        "studies.compare --preset lidar --episodes 500 --policies nearest-safe nearest-safe+convex"
-        " hazard-aware td3 --no-figures --out results/agents_lidar",
-    ),
-    "learnt-agents": Result(
-        "learnt-agents.md",
-        "rl.figures agents --results results/agents_paper results/agents_partial results/agents_lidar",
-        resumable=False,
-    ),
-    "planner": Result("planner.md", "studies.timing"),
-    "answers": Result(
-        "planner.md", "studies.timing --answers 100000 --starts 2 --out results/timing_answers"
-    ),
-    "closed-loop": Result("closed-loop.md", "studies.closed_loop --episodes 300"),
-    "looks": Result("looks.md", "studies.looks"),
-    "trade-off": Result("trade-off.md", "studies.trade_off --sweep-episodes 200"),
-    "robustness": Result(
-        "robustness.md", "studies.robustness --levels 1 --episodes 1000 --policies nearest-safe hazard-aware"
-    ),
-    "robustness-lidar": Result(
-        "robustness.md",
-        "studies.robustness --preset lidar --factors rays range-noise range-bias ray-dropout pointing-error"
-        " scan-time --levels 2 --policies nearest-safe nearest-safe+convex hazard-aware"
-        " --out results/robustness_lidar",
-    ),
-    "robustness-navigated": Result(
-        "robustness.md",
-        "studies.robustness --preset navigated --factors navigation --levels 2 --policies single-divert"
-        " nearest-safe nearest-safe+convex hazard-aware deferred-decision --out results/robustness_navigated",
-    ),
-    "faults": Result("robustness.md", "studies.faults --episodes 100 --explained 4"),
-    "measured": Result(
-        "realism.md",
-        "studies.realism --presets paper lidar lidar-coarse --episodes 500 --explained 8"
-        " --out results/measured",
-    ),
-    "realism": Result("realism.md", "studies.realism --explained 6"),
-    "rare-events": Result("rare-events.md", "studies.rare_events --effort 0.08 --whole 6000"),
-    "rare-events-single-divert": Result(
-        "rare-events.md",
-        "studies.rare_events --policy single-divert --effort 0.08 --whole 6000 --out results/rare_divert",
-    ),
-    "rare-events-hazard-aware": Result(
-        "rare-events.md",
-        "studies.rare_events --policy hazard-aware --whole 600 --out results/rare_hazard_aware",
-    ),
-    "rare-causes": Result("rare-events.md", "studies.rare_events --effort 0.5 --out results/rare_causes"),
-    "information-bound": Result("information-bound.md", "studies.information_bound"),
-    "rigid-plans": Result("../explanation/rigid-body-plans.md", "studies.rigid_plans --starts 1000"),
-    "scale": Result("scale.md", "studies.scale --episodes 1000 10000"),
-}
-"""Name -> what is made, the README's first."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -253,7 +160,3 @@ def main() -> None:
         failed = make_results(options, Console())
         if failed:
             raise ValueError(f"not made: {', '.join(failed)}; the lines above say why")
-
-
-if __name__ == "__main__":
-    main()
