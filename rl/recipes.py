@@ -14,7 +14,9 @@ from rl.settings import (
 )
 
 PPO_SETTINGS = OnPolicySettings()
-RECURRENT_PPO_SETTINGS = RecurrentOnPolicySettings(environments=64, batch_size=512, log_deviation=-1.5)
+RECURRENT_PPO_SETTINGS = RecurrentOnPolicySettings(
+    environments=64, batch_size=512, trace=0.95, log_deviation=-1.5
+)
 """Of fewer steps than ppo's, whose batch would leave it few updates."""
 TD3_SETTINGS = OffPolicyAgentSettings()
 SAC_SETTINGS = replace(

@@ -182,7 +182,7 @@ class OnPolicySettings(AgentSettings):
     epochs: int = 10
     batch_size: int = 1024
     discount: float = 0.99
-    trace: float = 0.95
+    trace: float = 0.9
     clip: float = 0.2
     value_weight: float = 0.5
     greatest_gradient: float = 0.5
