@@ -29,6 +29,7 @@ AGENTS = (
     "td3-lstm",
     "td3-lstm-plus",
     "td3-paper",
+    "td3-convex",
     "td3-partial",
     "td3-lstm-partial",
     "td3-lstm-plus-partial",
