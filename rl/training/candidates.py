@@ -56,11 +56,14 @@ class Choice:
         averages: how many successive actors are averaged; 1 is an actor itself.
         candidates: best ones, over as many episodes as the run's own validation, that are flown again.
         episodes: tuning episodes that each of these flies.
+        last: only the last so many actors of a run are judged, 0 for all. Of very many the best by few
+            episodes is the luckiest.
     """
 
     averages: tuple[int, ...] = (1, 3, 5, 9)
     candidates: int = 5
     episodes: int = 1000
+    last: int = 0
 
 
 def average_tensors(actors: Sequence[Tensors]) -> Tensors:
@@ -125,6 +128,7 @@ def best_of_run(run: Path, choice: Choice, workers: int) -> Candidate:
     rows = [row for row in read_rows(run / "validation.csv") if int(row["updates"]) > 0]
     if not rows:
         raise ValueError(f"{run} has no validated actor")
+    rows = rows[-choice.last :]
     steps = [int(row["step"]) for row in rows]
     actors = [load_artefact(run / "actors" / f"step-{step:09d}", "actor").tensors for step in steps]
     windows = [

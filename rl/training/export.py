@@ -86,6 +86,7 @@ def run_export(options: ExportWeights) -> None:
     from rl.training.run_folder import read_rows, read_run
 
     finite_number("workers", options.workers, at_least=1)
+    finite_number("last", options.choice.last, at_least=0)
     console = Console()
     cards = [read_run(run) for run in options.runs]
     first, asked = cards[0], [(settings_from_json(card["settings"]), card["preset"]) for card in cards]

@@ -64,6 +64,18 @@ def test_the_choice_does_not_depend_on_the_processes(runs):
         np.testing.assert_array_equal(two.tensors[name], tensor)
 
 
+@pytest.mark.parametrize(("last", "steps"), [(0, {30, 60}), (1, {60}), (2, {30, 60})])
+def test_only_the_last_actors_are_judged(last, steps, runs, monkeypatch):
+    choice = Choice(averages=(1,), candidates=9, episodes=2, last=last)
+    flown = []
+    monkeypatch.setattr(
+        "rl.inference.artefacts.load_artefact",
+        lambda path, kind: flown.append(int(path.name.removeprefix("step-"))) or load_artefact(path, kind),
+    )
+    assert set(best_of_run(runs[0], choice, 1).steps) <= steps
+    assert set(flown) == steps
+
+
 @given(arrays(np.float32, (4, 3), elements=floats(-10, 10, width=32)))
 def test_the_mean_of_actors_is_the_mean_of_each_weight(weights):
     mean = average_tensors([{"bias": row, "twice": 2 * row} for row in weights])
