@@ -30,9 +30,11 @@ AGENTS = (
     "td3-lstm-plus",
     "td3-paper",
     "td3-convex",
+    "ppo",
     "td3-partial",
     "td3-lstm-partial",
     "td3-lstm-plus-partial",
+    "td3-belief-partial",
     "td3-lidar",
 )
 """Names that `import rl` registers; this package may not import it, but may say so."""
