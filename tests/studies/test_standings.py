@@ -89,7 +89,7 @@ def test_great_differences_are_decided(
 def test_equal_policies_are_hardly_ever_told_apart() -> None:
     """Of 300 such studies 6.3 % had a false standing (at most 10 % by the two corrections).
 
-    Without the correction of the propellant it is a quarter or more, without clusters most. Sixty
+    Without the correction of the propellant it is about a quarter, without clusters most. Sixty
     studies with more than ten are one alarm in 800 at that rate.
     """
     rng, told = np.random.default_rng(2), 0
@@ -102,10 +102,10 @@ def test_equal_policies_are_hardly_ever_told_apart() -> None:
     assert told <= 10
 
 
-def among(others: int, **told: tuple[EpisodeRow, ...]) -> list[StandingRow]:
+def among(others: int, told: tuple[EpisodeRow, ...]) -> list[StandingRow]:
     """Lines of the policy that is told apart, beside others that fly as the reference does."""
     flown = [True] * EPISODES, [60.0] * EPISODES
-    rows = {REFERENCE: rows_of(REFERENCE, *flown), "td3": told["td3"]}
+    rows = {REFERENCE: rows_of(REFERENCE, *flown), "td3": told}
     rows |= {name: rows_of(name, *flown) for name in NAMES[:others]}
     return compare_to("paper", rows, REFERENCE)
 
@@ -121,7 +121,7 @@ def test_propellant_that_is_decided_alone_is_not_among_seven(sign: float, alone:
     burnt = (60.0 + sign * by_tile[np.arange(EPISODES) % TILES]).tolist()
     rows = rows_of("td3", [True] * EPISODES, burnt)
     for others, standing in ((0, alone), (6, Standing.UNDECIDED)):
-        line = among(others, td3=rows)[1]
+        line = among(others, rows)[1]
         assert min(sign * line.burns_more.low, sign * line.burns_more.high) > 0.0
         assert line.standing is standing
 
@@ -130,7 +130,7 @@ def test_failures_that_are_decided_alone_are_not_among_seven() -> None:
     """Seven that fail in one alone have p = 2 / 2^7 by McNemar's exact test, and Holm's seven times that."""
     rows = rows_of("td3", [k >= 7 for k in range(EPISODES)], [60.0] * EPISODES)
     for others, p, standing in ((0, 2.0**-6, Standing.BEHIND), (6, 7.0 * 2.0**-6, Standing.UNDECIDED)):
-        line = among(others, td3=rows)[1]
+        line = among(others, rows)[1]
         assert line.holm_p == pytest.approx(p)
         assert line.standing is standing
 
