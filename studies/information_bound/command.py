@@ -70,13 +70,15 @@ class InformationBound(FolderOptions):
     out: Path = Path("results/information_bound")
 
     def __post_init__(self) -> None:
-        """Check every number."""
+        """Check every number, and that no option contradicts another."""
         for name in ("episodes", "workers"):
             finite_number(name, getattr(self, name), at_least=1)
         finite_number("study_seed", self.study_seed, at_least=0)
         if list(self.looks) != sorted({*self.looks}) or min(self.looks, default=0) < 0:
             given = " ".join(map(str, self.looks))
             raise ValueError(f"looks must be numbers of at least 0, rising, each once, got {given}")
+        if self.redraw and not self.figures:
+            raise ValueError("redraw must not stand beside --no-figures: it draws the picture and no more")
 
 
 def plan_study(options: InformationBound) -> Study:

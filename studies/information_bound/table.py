@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from guidance.arrays import Array
+from guidance.validation import unknown_name
 from hda.flight.episode_row import EpisodeRow
 from hda.registry import policy_entry
 from studies.columns import Column
@@ -20,6 +21,7 @@ from studies.statistics.moments import collect_moments, mean_intervals
 from studies.statistics.ratios import Interval
 
 _TOLD = 1000  # to one
+_KINDS = _BOUND, _FLOWN = "bound", "flown"
 _NOTHING = Interval(math.nan, math.nan, math.nan)
 
 
@@ -95,7 +97,7 @@ def _points(key: str, heading: str, value: str) -> Column[StepRow]:
 
 COLUMNS: tuple[Column[StepRow], ...] = (
     Column("step", "step", lambda row: row.step, words=True, mark=_mark),
-    Column("kind", "", lambda row: "bound" if row.proved else "flown", words=True, label="kind"),
+    Column("kind", "", lambda row: _BOUND if row.proved else _FLOWN, words=True, label="kind"),
     Column("loss_percent", "loss", lambda row: row.loss, 2, "%", interval=True, stem="loss"),
     _points("rise_points", "above the step before", "rise"),
     _points("below_points", "below the last step", "below"),
@@ -108,7 +110,7 @@ def read_steps(path: Path) -> list[StepRow]:
     """The steps of a table that a run has written.
 
     Raises:
-        ValueError: it is no such table.
+        ValueError: it is no such table, or a loss or an end of its interval is not finite.
         OSError: it cannot be read.
     """
     with path.open(newline="") as stream:
@@ -120,10 +122,16 @@ def read_steps(path: Path) -> list[StepRow]:
     kinds = [line.proved for line in lines]
     if not any(kinds) or all(kinds) or kinds != sorted(kinds, reverse=True):
         raise ValueError(f"{path} must hold the table of a finished run of this study")
+    for line in lines:
+        if not all(math.isfinite(end) for end in vars(line.loss).values()):
+            raise ValueError(f"{path} must hold finite losses and intervals, over at least two tiles")
     return lines
 
 
 def _read_step(row: dict[str, str]) -> StepRow:
+    if row["kind"] not in _KINDS:
+        raise ValueError(unknown_name("kind", row["kind"], _KINDS))
+
     def number(key: str) -> float:
         return float(row[key] or math.nan)
 
@@ -132,7 +140,7 @@ def _read_step(row: dict[str, str]) -> StepRow:
 
     return StepRow(
         step=row["step"],
-        proved=row["kind"] == "bound",
+        proved=row["kind"] == _BOUND,
         loss=interval("loss_percent", "loss"),
         rise=interval("rise_points", "rise"),
         below=interval("below_points", "below"),
@@ -147,9 +155,10 @@ def tell_recognition(floors: Sequence[FloorRow]) -> str:
         return ""
     told = int((odds > math.log(_TOLD)).sum())
     rise = float(np.mean([row.penalised - row.floors[0] for row in floors]))
+    way = "rises" if rise >= 0.0 else "falls"
     return (
         f"the first look tells the tile, by {_TOLD} to 1 or more, in {told} of {odds.size} episodes;"
-        f" for policies that settle their cell by it, the first bound rises by {rise:.2g} points"
+        f" for policies that settle their cell by it, the first bound {way} by {abs(rise):.2g} points"
     )
 
 

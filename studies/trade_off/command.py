@@ -6,7 +6,7 @@ them beats in both. The ceiling and the floor are `hindsight`'s: the ratio of ep
 could have known safe ground, and the propellant without which none can land there softly. Where the sensor
 measures ranges there is no ceiling: it sees ground past the square of the look, so the proof does not hold.
 With a reference every policy is held against it on the same episodes: whether it fails more, and where both
-land, whether it burns more.
+land, whether it burns more. Ahead is who is known to do less of one, and not known to do more of the other.
 """
 
 from __future__ import annotations
@@ -158,7 +158,7 @@ def bound_preset(preset: Preset, options: TradeOff) -> Bounds:
 
 
 def run_trade_off(options: TradeOff) -> tuple[list[TradeOffRow], list[Bounds]]:
-    """Fly the study and write its folder.
+    """Fly the study and write its folder; what an earlier run left there and this one does not write goes.
 
     Raises:
         ValueError: an option is out of range or names something unknown, a folder holds another study, or a
@@ -173,6 +173,8 @@ def run_trade_off(options: TradeOff) -> tuple[list[TradeOffRow], list[Bounds]]:
     bounds = [bound_preset(find_preset(name), options) for name in options.presets if options.bounds]
     write_csv(out / "table.csv", COLUMNS, rows)
     write_markdown(out / "table.md", COLUMNS, rows)
+    for product in list_stale(options):
+        (out / product).unlink(missing_ok=True)
     if options.bounds:
         write_csv(out / "bounds.csv", BOUNDS_COLUMNS, bounds)
     if options.reference is not None:
@@ -183,6 +185,17 @@ def run_trade_off(options: TradeOff) -> tuple[list[TradeOffRow], list[Bounds]]:
         draw_trade_off(rows, bounds).savefig(out / "trade-off.png", dpi=85)
     write_provenance(out / "provenance.json", describe_run(options))
     return rows, bounds
+
+
+def list_stale(options: TradeOff) -> list[str]:
+    """Names of the products that a run with these options does not write."""
+    products = {
+        "bounds.csv": options.bounds,
+        "standings.csv": options.reference is not None,
+        "standings.md": options.reference is not None,
+        "trade-off.png": options.figures,
+    }
+    return [name for name, written in products.items() if not written]
 
 
 def write_standings(options: TradeOff, reference: str, flown: Mapping[str, Rows]) -> None:

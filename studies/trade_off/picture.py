@@ -92,7 +92,7 @@ def _draw_policies(axis: Axes, rows: Sequence[TradeOffRow], floor: float | None)
     axis.step(*np.array(front).T, where="post", color="0.3", linewidth=1.0, linestyle="--", label="front")
     if floor is not None:
         axis.axvline(floor, color="0.5", linewidth=1.0, linestyle=":", label="floor on propellant")
-    _label(axis, rows[0].ratio)
+    _label(axis, rows[0].landed_name)
 
 
 def _draw_weights(axis: Axes, rows: Sequence[TradeOffRow], start: TradeOffRow | None) -> None:
@@ -111,10 +111,10 @@ def _draw_weights(axis: Axes, rows: Sequence[TradeOffRow], start: TradeOffRow | 
             )
     if start is not None:
         _draw_point(axis, start, "black", "*", "default weights")
-    _label(axis, rows[0].ratio)
+    _label(axis, rows[0].landed_name)
 
 
 def _label(axis: Axes, ratio: str) -> None:
     axis.set_xlabel("propellant burnt [%], mean with Student's interval")
-    axis.set_ylabel(f"{ratio.replace('_', ' ')} [%], Wilson's interval, thin: by tile")
+    axis.set_ylabel(f"{ratio} [%], Wilson's interval, thin: by tile")
     axis.grid(alpha=0.25)

@@ -1,4 +1,4 @@
-"""How each policy stands against a reference on the same episodes: by failures first, then by propellant."""
+"""How each policy stands against a reference on the same episodes: who fails more, and who burns more."""
 
 from __future__ import annotations
 
@@ -26,7 +26,19 @@ _NOTHING = Interval(math.nan, math.nan, math.nan)
 
 
 class Standing(StrEnum):
-    """What two decisions say of a policy: who fails more, and who burns more where both land."""
+    """What two decisions say of a policy: who fails more, and who burns more where both land.
+
+    Neither decision comes before the other. An undecided one is no proof of equality: who stands ahead may
+    yet fail more.
+
+    Attributes:
+        REFERENCE: it is the policy that the others are held against.
+        AHEAD: it is decided that the policy fails less or burns less, and not that it does more of the other.
+        SAFER: it is decided that it fails less, and that it burns more.
+        UNDECIDED: neither is decided.
+        CHEAPER: it is decided that it burns less, and that it fails more.
+        BEHIND: it is decided that it fails more or burns more, and not that it does less of the other.
+    """
 
     REFERENCE = "the reference"
     AHEAD = "ahead"
@@ -64,9 +76,11 @@ class StandingRow:
 
 
 def judge(fails: int, burns: int) -> Standing:
-    """The standing, from two signs: 1 where the policy does more of it than the reference, -1 less, else 0.
+    """The standing, from two decisions that weigh the same.
 
-    A policy is ahead, or behind, where one decision says so and the other does not gainsay it.
+    Args:
+        fails: 1 where it is decided that the policy fails more than the reference, -1 less, else 0.
+        burns: the same of the propellant.
     """
     if fails * burns < 0:
         return Standing.CHEAPER if fails > 0 else Standing.SAFER
@@ -79,7 +93,9 @@ def compare_to(preset: str, rows: Rows, reference: str) -> list[StandingRow]:
     """The line of every policy of a preset, in the order given.
 
     Who fails more is decided by `decide_leads`, over all policies of the preset. Who burns more is decided by
-    the interval clustered by tile, at a confidence that keeps the chance of one false word among all of them.
+    the interval clustered by tile, at a confidence that keeps the chance of one false word among all of them
+    (Bonferroni). Each has a chance of up to `CHANCE` of its own, so that of one false standing or more on a
+    preset is up to twice that.
 
     Args:
         preset: name of the setting.

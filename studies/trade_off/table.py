@@ -42,6 +42,11 @@ class TradeOffRow:
     ratio: str = "safe_site"
 
     @property
+    def landed_name(self) -> str:
+        """The ratio that is set against the propellant, in words."""
+        return self.ratio.replace("_", " ")
+
+    @property
     def landed(self) -> Interval:
         """The ratio that is set against the propellant, with Wilson's interval."""
         return getattr(self.score, self.ratio)
@@ -87,6 +92,7 @@ COLUMNS: tuple[Column[TradeOffRow], ...] = (
     Column("privileged", "privileged", lambda row: row.privileged, outputs=Output.FILE),
     Column("episodes", "episodes", lambda row: row.score.episodes, outputs=Output.FILE),
     *(column.through(lambda row: row.score) for column in (*RATIO_COLUMNS, PROPELLANT_COLUMN)),
+    Column("ratio", "front by", lambda row: row.landed_name, words=True),
     Column("on_front", "front", lambda row: row.on_front, form=lambda on: "yes" if on else ""),
 )
 """The points: table.csv, table.md and the console read this list."""
@@ -102,7 +108,8 @@ BOUNDS_COLUMNS: tuple[Column[Bounds], ...] = (
 
 def print_trade_off(rows: Sequence[TradeOffRow], bounds: Sequence[Bounds]) -> None:
     """Print the points and the bounds."""
-    table = console_table(COLUMNS, rows, "safe landings against propellant", "* sees the true map")
+    ratios = " and ".join(dict.fromkeys(row.landed_name for row in rows))
+    table = console_table(COLUMNS, rows, f"{ratios} against propellant", "* sees the true map")
     console = Console(width=max(Console().width, 130))
     console.print(table)
     for b in bounds:

@@ -1,6 +1,7 @@
 """Bounds on every policy: below every flight, tight where they are proved, and penalties of mean zero."""
 
 import csv
+import io
 import math
 from dataclasses import replace
 from itertools import pairwise, product
@@ -12,6 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from matplotlib.container import BarContainer, ErrorbarContainer
+from matplotlib.image import imread
 
 import guidance
 from guidance.rigid_body.body import DEFAULT_BODY
@@ -30,7 +32,7 @@ from studies.columns import write_csv
 from studies.information_bound import Arrival, InformationBound, bound_cheapest, penalised_loss
 from studies.information_bound import run_information_bound as run
 from studies.information_bound.cheapest_landing import prove_cell
-from studies.information_bound.command import plan_study
+from studies.information_bound.command import main, plan_study
 from studies.information_bound.picture import draw_steps
 from studies.information_bound.recognition import (
     candidate_tiles,
@@ -40,13 +42,14 @@ from studies.information_bound.recognition import (
     weigh_tiles,
 )
 from studies.information_bound.restrictions import (
+    FloorRow,
     bound_episode,
     bound_losses,
     lies_in_view,
     list_restrictions,
     safe_places,
 )
-from studies.information_bound.table import COLUMNS, StepRow, flown_losses, read_steps
+from studies.information_bound.table import COLUMNS, StepRow, flown_losses, read_steps, tell_recognition
 from studies.information_bound.told import tell_map, told_path, true_square
 from studies.statistics.ratios import Interval
 
@@ -413,6 +416,73 @@ def test_another_table_is_refused(text: str, tmp_path: Path) -> None:
         path.write_text(text)
     with pytest.raises(ValueError, match="must hold the table of a finished run of this study"):
         read_steps(path)
+
+
+@pytest.mark.parametrize(
+    ("column", "value"), [("loss_percent", ""), ("loss_percent", "inf"), ("loss_high", "inf")]
+)
+def test_a_loss_that_is_not_finite_is_refused(column: str, value: str, tmp_path: Path) -> None:
+    path = change_table(tmp_path, column, value)
+    with pytest.raises(ValueError, match="must hold finite losses and intervals, over at least two tiles"):
+        read_steps(path)
+
+
+def test_an_unknown_kind_is_refused_and_named(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="must hold the table of a finished run of this study") as caught:
+        read_steps(change_table(tmp_path, "kind", "flow"))
+    assert "unknown kind 'flow'; did you mean flown" in str(caught.value.__cause__)
+
+
+def change_table(folder: Path, column: str, value: str) -> Path:
+    """A table of a run, with one cell of its third line changed."""
+    path = folder / "table.csv"
+    write_csv(path, COLUMNS, STEPS)
+    lines = list(csv.DictReader(path.read_text().splitlines()))
+    lines[2][column] = value
+    with path.open("w", newline="") as stream:
+        writer = csv.DictWriter(stream, lines[0].keys())
+        writer.writeheader()
+        writer.writerows(lines)
+    return path
+
+
+def test_the_command_redraws_a_finished_run_and_touches_nothing_else(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write_csv(tmp_path / "table.csv", COLUMNS, STEPS)
+    table = (tmp_path / "table.csv").read_bytes()
+    monkeypatch.setattr("sys.argv", ["information_bound", "--redraw", "--out", str(tmp_path)])
+    main()
+    assert {path.name for path in tmp_path.iterdir()} == {"information-bound.png", "table.csv"}
+    assert (tmp_path / "table.csv").read_bytes() == table
+    drawn = io.BytesIO()
+    draw_steps(STEPS).savefig(drawn, dpi=90)
+    drawn.seek(0)
+    assert np.array_equal(imread(tmp_path / "information-bound.png"), imread(drawn))
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [(["--no-figures"], "redraw must not stand beside --no-figures"), ([], "table.csv")],
+)
+def test_a_redraw_that_cannot_be_is_one_line(
+    words: list[str],
+    message: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setattr("sys.argv", ["information_bound", "--redraw", "--out", str(tmp_path), *words])
+    with pytest.raises(SystemExit, match="2"):
+        main()
+    assert message in " ".join(capsys.readouterr().err.split())
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(("penalised", "words"), [(51.0, "rises by 1 points"), (49.5, "falls by 0.5 points")])
+def test_words_say_which_way_the_first_bound_moves(penalised: float, words: str) -> None:
+    floors = [FloorRow(1, (50.0,), True, penalised, log_odds=9.0)]
+    assert tell_recognition(floors).endswith(f"the first bound {words}")
 
 
 @pytest.mark.parametrize("looks", [(2, 1), (1, 1), (-1,)])

@@ -2,6 +2,7 @@
 
 import csv
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +24,7 @@ from studies.campaign.score import Score
 from studies.columns import write_csv
 from studies.statistics.ratios import Interval
 from studies.trade_off.command import TradeOff, bound_preset, find_front, plan_points, run_trade_off
-from studies.trade_off.table import BOUNDS_COLUMNS, TradeOffRow, describe_bounds
+from studies.trade_off.table import BOUNDS_COLUMNS, TradeOffRow, describe_bounds, print_trade_off
 from studies.trade_off.weights import SWEEP, change_weight, sweep_name, sweep_path
 
 
@@ -190,6 +191,37 @@ def test_a_preset_that_measures_ranges_has_a_floor_and_says_why_no_ceiling(
         (line,) = csv.DictReader(stream)
     assert (line["ceiling_percent"] == "") == (not bounded)
     assert float(line["floor_percent"]) == pytest.approx(bounds.floor.estimate)
+
+
+def test_what_a_run_does_not_write_is_gone_from_its_folder(tmp_path: Path) -> None:
+    options = TradeOff(
+        presets=("paper",),
+        policies=("no-divert", "single-divert"),
+        weights=("none",),
+        episodes=2,
+        reference="single-divert",
+        workers=1,
+        out=tmp_path / "traded",
+    )
+    products = {"bounds.csv", "standings.csv", "standings.md", "trade-off.png"}
+
+    def left() -> set[str]:
+        return products & {path.name for path in options.out.iterdir()}
+
+    run_trade_off(options)
+    assert left() == products
+    run_trade_off(replace(options, resume=True, bounds=False, ratio="success"))
+    assert left() == products - {"bounds.csv"}
+    assert "| success | yes |" in (options.out / "table.md").read_text()
+    run_trade_off(replace(options, resume=True, reference=None, figures=False))
+    assert left() == {"bounds.csv"}
+    assert "| safe site | yes |" in (options.out / "table.md").read_text()
+
+
+def test_the_title_names_the_ratio_that_is_set_against_propellant(capsys: pytest.CaptureFixture[str]) -> None:
+    for name, words in (("safe_site", "safe site"), ("success", "success")):
+        print_trade_off([row("oracle", 0.9, 50.0, True, name)], [])
+        assert f"{words} against propellant" in capsys.readouterr().out
 
 
 def test_the_picture_is_there(out: Path) -> None:
