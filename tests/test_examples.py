@@ -9,6 +9,7 @@ import pytest
 import torch
 
 import guidance
+from examples import environment_speed
 from examples.ppo_single_file import Agent, Rollout, Settings, estimate_advantages, evaluate, train
 from hda.flight.outcome import Ending
 from rl.environment.episode_info import ENDING_CODES
@@ -69,6 +70,28 @@ def test_how_many_first_flights_crash_for_the_deviation(
             crashed += (info["final_info"]["ending"][ended] == ENDING_CODES[Ending.CRASH]).tolist()
     envs.close()
     assert bounds[0] < np.mean(crashed) < bounds[1]
+
+
+@pytest.mark.parametrize("count", [1, 4])
+def test_the_timing_example_flies_as_many_decisions_alone_and_together(
+    count: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two rounds of eight, the first to warm up; a step of four at a time is four."""
+    make, flown = (gymnasium.make if count == 1 else gymnasium.make_vec), []
+
+    def counted(*args: object, **options: object) -> object:
+        env = make(*args, **options)  # type: ignore[arg-type]
+        step = env.step
+        monkeypatch.setattr(env, "step", lambda action: (flown.append(action.shape), step(action))[1])
+        return env
+
+    monkeypatch.setattr(gymnasium, make.__name__, counted)
+    monkeypatch.setattr(environment_speed, "ROUNDS", 1)
+    monkeypatch.setattr(environment_speed, "STEPS", 8)
+    wall, processor = environment_speed.measure_step("rl:LunarHDA-v0", count, 1)
+    assert flown == [(5,) if count == 1 else (4, 5)] * (16 // count)
+    assert wall > 0.0
+    assert processor > 0.0
 
 
 @pytest.mark.slow
