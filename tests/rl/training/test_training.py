@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from hda.task.presets import PRESETS
-from rl.inference.artefacts import ArtefactError, load_artefact
+from rl.inference.artefacts import ArtefactError, load_artefact, save_artefact
 from rl.learning.algorithms import make_algorithm
 from rl.learning.recurrent.hyperparameters import Hyperparameters
 from rl.recipes import RECIPES
@@ -124,8 +124,9 @@ def test_a_run_resumes_on_another_device_and_says_so(tmp_path, capsys):
     assert json.loads((tmp_path / "run.json").read_text())["device"] == "cpu"
     run_training(tmp_path, PAPER, SMALL["td3"], plan(70), resume=True)
     assert "goes on on" not in capsys.readouterr().out
-    path = newest_checkpoint(tmp_path).with_suffix(".json")
-    path.write_text(path.read_text().replace('"device": "cpu"', '"device": "cuda"'))
+    path = newest_checkpoint(tmp_path)
+    kept = load_artefact(path, "checkpoint")
+    save_artefact(path, "checkpoint", kept.tensors, {**kept.card, "device": "cuda"})
     run_training(tmp_path, PAPER, SMALL["td3"], plan(80), resume=True)
     assert "it learnt on cuda so far, and goes on on cpu" in capsys.readouterr().out
 
