@@ -74,8 +74,9 @@ OFF_POLICY_RECIPES: dict[str, OffPolicyAgentSettings] = {
     ),
 }
 """`td3-paper` is the vector that the paper prints with the settings that TD3's authors published, since the
-paper gives none. The other settings were chosen by measurement, but those of "belief" and "convex": they are
-td3's for fewer steps, a belief's with half as many updates, and nothing was tuned for them."""
+paper gives none. The other settings were chosen by measurement, but those with "belief" or "convex" in their
+name: they are td3's for fewer steps, with fewer random ones and an earlier decay, and nothing was tuned for
+them. Only `td3-belief` updates once in two steps. Convex guidance has no gains for a prior to hold."""
 
 ON_POLICY_RECIPES: dict[str, OnPolicySettings] = {
     "ppo": PPO_SETTINGS,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from typing import Any, Literal, get_args
 
+from guidance.validation import whole_number
 from rl.environment.action import ActionRanges
 from rl.environment.encoding import CURVED
 from rl.inference.artefacts import ENCODER
@@ -31,6 +32,9 @@ class OffPolicySettings:
         random_steps: steps with uniform actions before the first update.
         replay_size: transitions kept.
         update_every: environment steps for one update.
+
+    Raises:
+        ValueError: update_every is not a whole number of at least 1.
     """
 
     batch_size: int = 256
@@ -41,6 +45,10 @@ class OffPolicySettings:
     random_steps: int = 25_000
     replay_size: int = 400_000
     update_every: int = 1
+
+    def __post_init__(self) -> None:
+        """Refuse an interval between updates that is none."""
+        whole_number("update_every", self.update_every, at_least=1)
 
 
 @dataclass(frozen=True)
@@ -76,7 +84,8 @@ class AgentSettings:
         learning_rate: of Adam, until the decay begins.
         final_learning_rate: where the decay ends.
         learning_rate_decay: steps at which its linear decay begins and ends.
-        matmul_precision: "highest" is float32; "medium" lets the processor multiply in bfloat16 where it can.
+        matmul_precision: "highest" is float32; with "medium" the processor multiplies in bfloat16 where it
+            can, and a GPU in TF32.
         shift: the target moves by at most this share of the look's width in one decision.
         sight: what it sees beside the flight: the last look, or the belief that all looks have left.
         guidance: what flies to the site: ZEM/ZEV with gains and clock of the agent's own; or convex guidance,

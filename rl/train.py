@@ -29,6 +29,7 @@ from rl.recipes import (
     STEPS,
 )
 from rl.settings import (
+    WITH_MEMORY,
     AgentSettings,
     OffPolicyAgentSettings,
     OnPolicySettings,
@@ -54,7 +55,8 @@ class TrainingOptions:
         validate_every: steps between validations.
         validation_episodes: episodes of each validation.
         checkpoint_every: least steps between checkpoints.
-        device: that torch learns on; auto takes a GPU where torch sees one. Episodes fly on the processor.
+        device: that torch learns on; auto takes a GPU for an agent with memory, where torch sees one.
+            Episodes fly on the processor.
     """
 
     settings: tyro.conf.OmitArgPrefixes[AgentSettings]
@@ -152,7 +154,7 @@ def run_agent_training(options: TrainingOptions, name: str) -> None:
     """Run the command of an agent.
 
     Raises:
-        ValueError: an option is out of range, or the folder holds another run.
+        ValueError: an option is out of range, torch does not see the device, or the folder holds another run.
     """
     from guidance.validation import finite_number
     from hda.ground.library import Ground, prepare_tiles
@@ -164,6 +166,7 @@ def run_agent_training(options: TrainingOptions, name: str) -> None:
     for field in ("steps", "validate_every", "validation_episodes", "checkpoint_every"):
         finite_number(field, getattr(options, field), at_least=1)
     finite_number("seed", options.seed, at_least=0)
+    device = choose_device(options.device, options.settings.algorithm in WITH_MEMORY)
     preset = find_preset(options.preset)
     for split in ("train", "tuning"):
         prepare_tiles(Ground(preset.terrain, preset.criteria), split)
@@ -176,7 +179,7 @@ def run_agent_training(options: TrainingOptions, name: str) -> None:
         options.checkpoint_every,
     )
     folder = options.out or Path("runs") / f"{name}-{options.seed}"
-    run_training(folder, preset, options.settings, plan, options.resume, choose_device(options.device))
+    run_training(folder, preset, options.settings, plan, options.resume, device)
 
 
 def main() -> None:

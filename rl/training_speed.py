@@ -1,6 +1,7 @@
 """Updates a second of plain Stable-Baselines3 TD3 and of ours: same sizes, one thread, taken in turn.
 
 The agents with memory are measured apart: they learn from sequences, and there is no other to compare with.
+The processor is timed by its own time, which other programs disturb least, a GPU by the clock on the wall.
 
 python -m rl.training_speed
 python -m rl.training_speed --profile    # and what the update of td3-lstm spends its time on, and the bound
@@ -11,7 +12,9 @@ from __future__ import annotations
 import sys
 import time as clock
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
@@ -33,8 +36,9 @@ class TrainingSpeed:
         sequences: per update of an agent with memory.
         length: transitions in each.
         memory: hidden size of its LSTMs.
-        device: that torch learns on; auto takes a GPU where torch sees one.
-        profile: print what the update of td3-lstm spends its time on, and how many this core can make.
+        device: that torch learns on.
+        profile: print what the update of td3-lstm spends its time on, and how many this core can make; of the
+            processor alone.
     """
 
     rounds: int = 7
@@ -44,8 +48,26 @@ class TrainingSpeed:
     sequences: int = 100
     length: int = 10
     memory: int = 128
-    device: Literal["auto", "cpu", "cuda"] = "cpu"
+    device: Literal["cpu", "cuda"] = "cpu"
     profile: bool = False
+
+    @property
+    def precisions(self) -> dict[str, str]:
+        """Precisions of torch by what they mean: on a GPU cuDNN's LSTM multiplies in TF32 in any case."""
+        fewer_bits = "bfloat16" if self.device == "cpu" else "TF32"
+        return {"float32": "highest", fewer_bits: "medium"}
+
+    def check(self) -> None:
+        """Refuse what cannot be measured here.
+
+        Raises:
+            ValueError: a GPU is asked for its profile, or torch sees none.
+        """
+        from rl.learning.device import choose_device
+
+        choose_device(self.device, with_memory=True)
+        if self.profile and self.device != "cpu":
+            raise ValueError(f"device must be cpu with --profile, got {self.device}")
 
 
 @dataclass(frozen=True)
@@ -53,17 +75,38 @@ class UpdateRate:
     """Updates a second, medians over the rounds.
 
     Attributes:
-        processor: by processor time, which other programs disturb least.
+        processor: by processor time. A thread that waits for a GPU spins, and its waiting counts.
         wall: by the clock on the wall.
     """
 
     processor: float
     wall: float
 
+    def on(self, device: str) -> float:
+        """What counts on a device: processor time on "cpu", the clock on the wall on "cuda"."""
+        return self.processor if device == "cpu" else self.wall
+
+
+def time_work(work: Callable[[], None], device: str) -> tuple[float, float]:
+    """[s] processor time and wall time of some work, the GPU's own share included."""
+    import torch
+
+    if device == "cuda":
+        torch.cuda.synchronize()
+    started = clock.process_time(), clock.perf_counter()
+    work()
+    if device == "cuda":
+        torch.cuda.synchronize()
+    return clock.process_time() - started[0], clock.perf_counter() - started[1]
+
+
+def _rates(times: dict[str, list[tuple[float, float]]], updates: int) -> dict[str, UpdateRate]:
+    medians = {name: np.median(values, axis=0) / updates for name, values in times.items()}
+    return {name: UpdateRate(*(1.0 / float(value) for value in spent)) for name, spent in medians.items()}
+
 
 def _filled(kind: Any, options: TrainingSpeed, fused: bool) -> Any:
     from rl.environment.env import LunarHDAEnv
-    from rl.learning.device import choose_device
 
     extra = {"optimizer_kwargs": {"fused": True}} if fused else {}
     model = kind(
@@ -71,7 +114,7 @@ def _filled(kind: Any, options: TrainingSpeed, fused: bool) -> Any:
         LunarHDAEnv(),
         seed=0,
         buffer_size=10_000,
-        device=choose_device(options.device),
+        device=options.device,
         policy_kwargs={"net_arch": list(options.hidden), **extra},
     )
     model._setup_learn(1, None)
@@ -84,8 +127,8 @@ def _filled(kind: Any, options: TrainingSpeed, fused: bool) -> Any:
     return model
 
 
-def measure_training_speed(options: TrainingSpeed) -> dict[str, float]:
-    """Updates a second of processor time: plain SB3, ours in float32, ours with bfloat16 products."""
+def measure_training_speed(options: TrainingSpeed) -> dict[str, UpdateRate]:
+    """Updates a second: plain SB3, ours in float32, ours with products of fewer bits."""
     import torch
     from stable_baselines3 import TD3
 
@@ -96,18 +139,16 @@ def measure_training_speed(options: TrainingSpeed) -> dict[str, float]:
     plain, fast = _filled(TD3, options, fused=False), _filled(FastTD3, options, fused=True)
     cases = {
         "stable-baselines3": (plain, "highest"),
-        "float32": (fast, "highest"),
-        "bfloat16 products": (fast, "medium"),
+        **{kind: (fast, precision) for kind, precision in options.precisions.items()},
     }
-    times: dict[str, list[float]] = {name: [] for name in cases}
+    times: dict[str, list[tuple[float, float]]] = {name: [] for name in cases}
     for _ in range(options.rounds):
         for name, (model, precision) in cases.items():
             with matmul_precision(precision):
                 model.train(4, options.batch_size)
-                started = clock.process_time()
-                model.train(options.updates, options.batch_size)
-                times[name].append((clock.process_time() - started) / options.updates)
-    return {name: 1.0 / float(np.median(values)) for name, values in times.items()}
+                work = partial(model.train, options.updates, options.batch_size)
+                times[name].append(time_work(work, options.device))
+    return _rates(times, options.updates)
 
 
 def _filled_with_sequences(name: str, options: TrainingSpeed) -> Any:
@@ -116,12 +157,11 @@ def _filled_with_sequences(name: str, options: TrainingSpeed) -> Any:
 
     from rl.environment.env import LunarHDAEnv
     from rl.learning.algorithms import make_agent_with_memory
-    from rl.learning.device import choose_device
     from rl.learning.recurrent.replay import Episode
     from rl.recipes import RECURRENT_RECIPES
 
     recipe = replace(RECURRENT_RECIPES[name], batch_size=options.sequences, memory=options.memory)
-    agent = make_agent_with_memory(recipe, LunarHDAEnv(), 0, choose_device(options.device))
+    agent = make_agent_with_memory(recipe, LunarHDAEnv(), 0, options.device)
     rng, length = np.random.default_rng(0), options.length
     for _ in range(2 * options.sequences):
         observations = rng.uniform(-1.0, 1.0, (length + 1, agent.sizes.observation))
@@ -132,26 +172,22 @@ def _filled_with_sequences(name: str, options: TrainingSpeed) -> Any:
 
 
 def measure_memory_speed(options: TrainingSpeed) -> dict[str, UpdateRate]:
-    """Updates a second of td3-lstm and td3-lstm-plus, in float32 and with bfloat16 products."""
+    """Updates a second of td3-lstm and td3-lstm-plus, in float32 and with products of fewer bits."""
     import torch
 
     from rl.learning.precision import matmul_precision
 
     torch.set_num_threads(1)
     agents = {name: _filled_with_sequences(name, options) for name in ("td3-lstm", "td3-lstm-plus")}
-    precisions = {"float32": "highest", "bfloat16": "medium"}
     times: dict[str, list[tuple[float, float]]] = {}
     for _ in range(options.rounds):
         for name, agent in agents.items():
-            for kind, precision in precisions.items():
+            for kind, precision in options.precisions.items():
                 with matmul_precision(precision):
                     agent.train(2)
-                    started = clock.process_time(), clock.perf_counter()
-                    agent.train(options.updates)
-                    spent = clock.process_time() - started[0], clock.perf_counter() - started[1]
+                    spent = time_work(partial(agent.train, options.updates), options.device)
                 times.setdefault(f"{name} {kind}", []).append(spent)
-    medians = {name: np.median(values, axis=0) / options.updates for name, values in times.items()}
-    return {name: UpdateRate(*(1.0 / float(value) for value in spent)) for name, spent in medians.items()}
+    return _rates(times, options.updates)
 
 
 def profile_memory(options: TrainingSpeed) -> str:
@@ -211,19 +247,28 @@ def main() -> None:
     options = tyro.cli(TrainingSpeed, description=__doc__)
     with one_line_errors():
         require_training_libraries()
+        options.check()
+        _print_speeds(options)
+        if options.profile:
+            sys.stdout.write(profile_memory(options))
+            products, rate = count_products("td3-lstm", options), measure_products()
+            sys.stdout.write(
+                f"an update of td3-lstm multiplies {products / 1e9:.2f} GFLOP, this core {rate / 1e9:.0f} "
+                f"GFLOP/s: at most {rate / products:.0f} updates/s in float32\n"
+            )
+
+
+def _print_speeds(options: TrainingSpeed) -> None:
+    clock_name = "processor time" if options.device == "cpu" else "the wall clock"
+    sys.stdout.write(f"updates a second on {options.device}, by {clock_name}\n")
     speeds = measure_training_speed(options)
-    reference = speeds["stable-baselines3"]
-    for name, speed in speeds.items():
+    reference = speeds["stable-baselines3"].on(options.device)
+    for name, rate in speeds.items():
+        speed = rate.on(options.device)
         sys.stdout.write(f"{name:23s} {speed:6.1f} updates/s  {speed / reference:5.2f}\n")
     for name, rate in measure_memory_speed(options).items():
-        sys.stdout.write(f"{name:23s} {rate.processor:6.1f} updates/s, {rate.wall:6.1f} by the wall clock\n")
-    if options.profile:
-        sys.stdout.write(profile_memory(options))
-        products, rate = count_products("td3-lstm", options), measure_products()
-        sys.stdout.write(
-            f"an update of td3-lstm multiplies {products / 1e9:.2f} GFLOP, this core {rate / 1e9:.0f} "
-            f"GFLOP/s: at most {rate / products:.0f} updates/s in float32\n"
-        )
+        other = f", {rate.wall:6.1f} by the wall clock" if options.device == "cpu" else ""
+        sys.stdout.write(f"{name:23s} {rate.on(options.device):6.1f} updates/s{other}\n")
 
 
 if __name__ == "__main__":

@@ -17,6 +17,7 @@ from guidance.rigid_body.motion import fly_intervals
 from guidance.rigid_body.quaternion import tilt_angle
 from guidance.rigid_descent.flight import RigidFlight
 from guidance.rigid_descent.problem import RigidLandingProblem
+from guidance.validation import whole_number
 
 _PARTS = 4  # of an interval, at whose ends the limits are measured
 _TOLERANCE = {
@@ -111,6 +112,9 @@ def fly_plan(flight: RigidFlight, problem: RigidLandingProblem, parts: int = 1) 
     Returns:
         Shape ((N - 1) parts + 1, 17): flown states, every `parts`-th at a node. The first is the problem's
         start, with the flight's attitude or thrust only where these are free.
+
+    Raises:
+        ValueError: parts is not a whole number of at least 1.
     """
     body = problem.body
     start = problem.state.as_array()
@@ -118,14 +122,26 @@ def fly_plan(flight: RigidFlight, problem: RigidLandingProblem, parts: int = 1) 
         start[6:10] = flight.attitude[0]
     if problem.free_thrust:
         start[14:17] = flight.thrust[0]
-    durations = np.repeat(np.diff(flight.time) / parts, parts)
     thrust = cut_commands(flight.thrust_commands(body.engine_lag), parts)
     torque = cut_commands(flight.torque_commands(), parts)
+    durations = np.repeat(np.diff(flight.time) / parts, parts)
     return fly_intervals(start, thrust, torque, durations, body.numbers(problem.gravity))
 
 
 def cut_commands(commands: Array, parts: int) -> Array:
-    """Linear commands of K intervals, shape (K, 2, 3), with each interval cut in equal parts."""
+    """Cut each interval of linear commands in equal parts.
+
+    Args:
+        commands: shape (K, 2, 3), at both ends of each of K intervals; [N], [N m] or whatever they are.
+        parts: of an interval.
+
+    Returns:
+        Shape (K parts, 2, 3): the same commands, in time order, at both ends of each part.
+
+    Raises:
+        ValueError: parts is not a whole number of at least 1.
+    """
+    whole_number("parts", parts, at_least=1)
     shares = np.linspace(0.0, 1.0, parts + 1)
     first, last = commands[:, None, 0], commands[:, None, 1]
     at = first + shares[None, :, None] * (last - first)

@@ -13,7 +13,9 @@ def matmul_precision(precision: str) -> Iterator[None]:
     """Let torch multiply float32 matrices so; what held before holds again afterwards, whatever happens.
 
     Args:
-        precision: "highest" is float32; "high" and "medium" let the processor use fewer bits where it can.
+        precision: "highest" is float32; with "medium" the processor multiplies in bfloat16 where it
+            can. A GPU multiplies in TF32 with "high" and with "medium", and cuDNN's LSTM there in any case
+            (`torch.backends.cudnn.rnn.fp32_precision`).
 
     Raises:
         RuntimeError: torch knows no such precision.

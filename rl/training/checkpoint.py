@@ -70,7 +70,8 @@ def save_checkpoint(folder: Path, algorithm: Algorithm, env: Environment, card: 
     tensors["generator/torch"] = torch.get_rng_state().numpy()
     if algorithm.device.type == "cuda":
         tensors["generator/cuda"] = torch.cuda.get_rng_state(algorithm.device).numpy()
-    save_artefact(path, KIND, tensors, {**card, "generators": generators, "counters": counters})
+    kept = {**card, "device": algorithm.device.type, "generators": generators, "counters": counters}
+    save_artefact(path, KIND, tensors, kept)
     for old in folder.glob("checkpoint-*"):
         if old.stem != path.name:
             old.unlink()
@@ -88,6 +89,9 @@ def newest_checkpoint(folder: Path) -> Path | None:
 
 def restore_checkpoint(path: Path, algorithm: Algorithm, env: Environment) -> dict[str, Any]:
     """Put a fresh algorithm and environment where the checkpoint was taken.
+
+    A checkpoint of the processor holds no state of a GPU's generator: resumed on a GPU, that generator begins
+    with the run's seed.
 
     Args:
         path: of the checkpoint, without suffix.
@@ -126,9 +130,17 @@ def _restore_run(artefact: Artefact, algorithm: Algorithm, env: Environment) -> 
     name, keys, *rest = generators["numpy"]
     np.random.set_state((name, np.array(keys, dtype=np.uint32), *rest))  # noqa: NPY002 - SB3 draws from it
     torch.set_rng_state(torch.from_numpy(artefact.tensors["generator/torch"].copy()))
-    if algorithm.device.type == "cuda" and "generator/cuda" in artefact.tensors:
-        state = torch.from_numpy(artefact.tensors["generator/cuda"].copy())
-        torch.cuda.set_rng_state(state, algorithm.device)
+    if algorithm.device.type == "cuda":
+        assert algorithm.seed is not None  # that of the run
+        _restore_gpu_generator(artefact.tensors, algorithm.device, algorithm.seed)
+
+
+def _restore_gpu_generator(tensors: Tensors, device: torch.device, seed: int) -> None:
+    """Put the generator of a GPU where it was; where no GPU was, to the run's seed."""
+    if "generator/cuda" in tensors:
+        torch.cuda.set_rng_state(torch.from_numpy(tensors["generator/cuda"].copy()), device)
+    else:
+        torch.cuda.manual_seed(seed)
 
 
 def _begin_episode(algorithm: Any) -> None:

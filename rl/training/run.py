@@ -43,7 +43,8 @@ def run_training(
         settings: what is learnt.
         plan: how long and how seeded.
         resume: go on from the newest checkpoint in the folder, if there is one.
-        device: that torch learns on, "cpu" or "cuda"; episodes are flown on the processor.
+        device: that torch learns on, "cpu" or "cuda"; episodes are flown on the processor. A run may be
+            resumed on another one, which is announced: it learns other weights than one that stays.
 
     Raises:
         ValueError: the folder holds a run and `resume` is not set, or holds a run with other settings; the
@@ -66,7 +67,7 @@ def _train(
 
     settings.refuse_steps(plan.steps)
     env = make_environment(settings, preset)  # refuses what cannot be learnt before a folder is made
-    checkpoint = _open_folder(folder, preset, settings, plan, resume)
+    checkpoint = _open_folder(folder, preset, settings, plan, resume, device)
     flown = env if isinstance(env, LandingEnv) else StableBaselinesVector(env)
     algorithm = make_algorithm(settings, flown, plan.seed, device)
     algorithm.set_logger(Logger(str(folder), [TensorBoardOutputFormat(str(folder / "tensorboard"))]))
@@ -82,8 +83,11 @@ def _train(
     with Progress(*columns) as progress:
         recorder = Recorder(folder, plan, settings, env, progress)
         if checkpoint is not None:
-            recorder.restore(restore_checkpoint(checkpoint, algorithm, env))
+            card = restore_checkpoint(checkpoint, algorithm, env)
+            recorder.restore(card)
             progress.console.print(f"resuming {folder} at step {algorithm.num_timesteps}")
+            if card.get("device", device) != device:
+                progress.console.print(f"it learnt on {card['device']} so far, and goes on on {device}")
         if isinstance(env, SteppedVectorEnv):
             progress.console.print("the native batch does not serve this: environments are stepped in turn")
         remaining = plan.steps - algorithm.num_timesteps
@@ -120,9 +124,9 @@ def make_environment(
 
 
 def _open_folder(
-    folder: Path, preset: Preset, settings: AgentSettings, plan: TrainingPlan, resume: bool
+    folder: Path, preset: Preset, settings: AgentSettings, plan: TrainingPlan, resume: bool, device: str
 ) -> Path | None:
-    """Write `run.json`, or check it; give the checkpoint to resume from."""
+    """Write `run.json`, or check it; give the checkpoint to resume from. The device need not be the same."""
     asked = json.loads(
         json.dumps(
             {
@@ -147,7 +151,8 @@ def _open_folder(
                 f"{folder} was begun with another {' and '.join(changed)}; resume it with the same"
             )
     folder.mkdir(parents=True, exist_ok=True)
-    contents = {**asked, "plan": asdict(plan), "versions": library_versions(), "card": actor_card(settings)}
+    contents = {**asked, "plan": asdict(plan), "device": device}
+    contents |= {"versions": library_versions(), "card": actor_card(settings)}
     card.write_text(json.dumps(contents, indent=1, sort_keys=True) + "\n")
     checkpoint = newest_checkpoint(folder) if resume else None
     if checkpoint is None:

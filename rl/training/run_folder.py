@@ -2,7 +2,7 @@
 
 A run's folder holds
 
-- `run.json`: what was asked for;
+- `run.json`: what was asked for, and the device that its last session learnt on;
 - `training.csv`: losses, reward and safe ratio over windows of steps;
 - `validation.csv`: the deterministic policy on the tuning tiles, every so many steps;
 - `actors/`: the actor at each validation;
@@ -25,7 +25,7 @@ class TrainingPlan:
     """How long, how often, how seeded.
 
     Attributes:
-        steps: environment steps; one update each after the random ones.
+        steps: environment steps; how many of them an update takes is a setting.
         seed: of weights, exploration and episodes.
         recipe: name of the command that trains it.
         validate_every: steps between validations.

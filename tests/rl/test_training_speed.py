@@ -1,18 +1,63 @@
 from __future__ import annotations
 
+import sys
+import time
+
+import pytest
+import torch
+
 from rl.training_speed import (
     TrainingSpeed,
+    UpdateRate,
     count_products,
+    main,
     measure_memory_speed,
     measure_products,
     measure_training_speed,
+    time_work,
 )
 
 
 def test_training_is_measured_beside_plain_sb3():
     speeds = measure_training_speed(TrainingSpeed(rounds=1, updates=2, batch_size=8))
-    assert set(speeds) == {"stable-baselines3", "float32", "bfloat16 products"}
-    assert min(speeds.values()) > 0.0
+    assert set(speeds) == {"stable-baselines3", "float32", "bfloat16"}
+    for rate in speeds.values():
+        assert min(rate.processor, rate.wall) > 0.0
+
+
+def test_a_gpu_multiplies_in_tf32_and_is_timed_by_the_wall_clock():
+    assert TrainingSpeed(device="cuda").precisions == {"float32": "highest", "TF32": "medium"}
+    rate = UpdateRate(processor=2.0, wall=3.0)
+    assert (rate.on("cpu"), rate.on("cuda")) == (2.0, 3.0)
+
+
+def test_what_a_gpu_still_computes_is_timed_too(monkeypatch):
+    def finish_queue():
+        time.sleep(queued.pop())
+
+    queued = [0.05, 0.0]  # before the work nothing waits, behind it 50 ms
+    monkeypatch.setattr(torch.cuda, "synchronize", finish_queue)
+    processor, wall = time_work(lambda: None, "cuda")
+    assert wall >= 0.05 > processor
+    assert not queued
+
+
+@pytest.mark.parametrize(
+    ("seen", "words", "message"),
+    [
+        (False, ["--device", "cuda"], "error: device cuda: torch sees no GPU here"),
+        (True, ["--device", "cuda", "--profile"], "error: device must be cpu with --profile, got cuda"),
+    ],
+)
+def test_a_device_that_cannot_be_measured_is_one_line(seen, words, message, monkeypatch, capsys):
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: seen)
+    monkeypatch.setattr(sys, "argv", ["training_speed", *words])
+    with pytest.raises(SystemExit) as stopped:
+        main()
+    assert stopped.value.code == 2
+    error = capsys.readouterr().err
+    assert error.startswith(message)
+    assert error.count("\n") == 1
 
 
 def test_the_speed_of_agents_with_memory_is_measured_in_both_precisions():

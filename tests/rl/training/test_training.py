@@ -9,10 +9,13 @@ import numpy as np
 import pytest
 
 from hda.task.presets import PRESETS
-from rl.inference.artefacts import ArtefactError, load_artefact
+from rl.inference.artefacts import ArtefactError, load_artefact, save_artefact
+from rl.learning.algorithms import make_algorithm
+from rl.learning.recurrent.hyperparameters import Hyperparameters
 from rl.recipes import RECIPES
+from rl.training.checkpoint import newest_checkpoint, restore_checkpoint
 from rl.training.export import ExportWeights, run_export
-from rl.training.run import run_training
+from rl.training.run import make_environment, run_training
 from rl.training.run_folder import TrainingPlan, read_rows
 
 PAPER = PRESETS["paper"]
@@ -108,11 +111,47 @@ def test_a_run_from_before_a_setting_was_added_goes_on(tmp_path):
     folder = tmp_path / "run"
     run_training(folder, PAPER, SMALL["td3"], plan(60), resume=False)
     card = json.loads((folder / "run.json").read_text())
-    for name in ("sight", "guidance"):
+    for name in ("sight", "guidance", "update_every"):
         del card["settings"][name]
+    del card["device"]
     (folder / "run.json").write_text(json.dumps(card))
     run_training(folder, PAPER, SMALL["td3"], plan(80), resume=True)
     assert read_rows(folder / "training.csv")[-1]["step"] == "80"
+
+
+def test_a_run_resumes_on_another_device_and_says_so(tmp_path, capsys):
+    run_training(tmp_path, PAPER, SMALL["td3"], plan(60), resume=False)
+    assert json.loads((tmp_path / "run.json").read_text())["device"] == "cpu"
+    run_training(tmp_path, PAPER, SMALL["td3"], plan(70), resume=True)
+    assert "goes on on" not in capsys.readouterr().out
+    path = newest_checkpoint(tmp_path)
+    kept = load_artefact(path, "checkpoint")
+    save_artefact(path, "checkpoint", kept.tensors, {**kept.card, "device": "cuda"})
+    run_training(tmp_path, PAPER, SMALL["td3"], plan(80), resume=True)
+    assert "it learnt on cuda so far, and goes on on cpu" in capsys.readouterr().out
+
+
+def test_a_gpu_that_resumes_a_run_of_the_processor_draws_by_its_seed(tmp_path, monkeypatch):
+    import torch
+
+    run_training(tmp_path, PAPER, SMALL["td3"], plan(60, seed=3), resume=False)
+    env = make_environment(SMALL["td3"], PAPER)
+    algorithm = make_algorithm(SMALL["td3"], env, 3)
+    seeds = []
+    monkeypatch.setattr(torch.cuda, "manual_seed", seeds.append)
+    restore_checkpoint(newest_checkpoint(tmp_path), algorithm, env)
+    assert seeds == []
+    algorithm.device = torch.device("cuda")
+    restore_checkpoint(newest_checkpoint(tmp_path), algorithm, env)
+    assert seeds == [3]
+
+
+@pytest.mark.parametrize("every", [0, -1, 1.5])
+def test_an_update_takes_at_least_one_step(every):
+    with pytest.raises(ValueError, match=f"update_every must be an integer of at least 1, got {every}"):
+        replace(SMALL["td3"], update_every=every)
+    with pytest.raises(ValueError, match="update_every"):
+        Hyperparameters(update_every=every)
 
 
 def test_a_run_with_a_setting_of_another_version_is_refused(tmp_path):
