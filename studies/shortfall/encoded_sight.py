@@ -217,7 +217,7 @@ def count_islands(record: EpisodeRecord, decoded: NDArray[np.float32]) -> list[S
         read = read_pixels(record, index)[2]
         safe = read & (observation.safety_map >= SAFE_READING)
         number: NDArray[np.int_] = label(safe, touching)[0]  # type: ignore[index]
-        limit, kept = safe & ~binary_erosion(read, touching), decoded[index] >= SAFE_READING
+        limit, kept = safe & np.logical_not(binary_erosion(read, touching)), decoded[index] >= SAFE_READING
         cells = (number[part] for part in (safe, safe & kept, limit))
         pixels, shown, cut = (np.bincount(one, minlength=int(number.max()) + 1)[1:] for one in cells)
         area, shown = np.searchsorted(AREAS, pixels[cut == 0] * observation.pixel_size**2), shown[cut == 0]

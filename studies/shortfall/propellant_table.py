@@ -57,7 +57,9 @@ def average_parts(
     if beside is not None:
         values -= np.array([_numbers(flight.parts) for flight in beside])
     intervals = [mean_intervals(collect_moments(part, tiles), 0)[1] for part in values.T[:6]]
-    return PartRow(policy, *intervals, *values[:, 6:].mean(axis=0).tolist())
+    whole, direct, first, early, late, guidance = intervals
+    moves, moved, offset, time = values[:, 6:].mean(axis=0).tolist()
+    return PartRow(policy, whole, direct, first, early, late, guidance, moves, moved, offset, time)
 
 
 def _numbers(parts: PropellantParts) -> list[float]:
