@@ -221,8 +221,8 @@ def count_islands(record: EpisodeRecord, decoded: NDArray[np.float32]) -> list[S
         cells = (number[part] for part in (safe, safe & kept, limit))
         pixels, shown, cut = (np.bincount(one, minlength=int(number.max()) + 1)[1:] for one in cells)
         area, shown = np.searchsorted(AREAS, pixels[cut == 0] * observation.pixel_size**2), shown[cut == 0]
-        for column, kept in enumerate((area, area[shown > 0])):
-            counts[_band_of(observation), :, column] += np.bincount(kept, minlength=len(AREAS) + 1)
+        for column, bands in enumerate((area, area[shown > 0])):
+            counts[_band_of(observation), :, column] += np.bincount(bands, minlength=len(AREAS) + 1)
     return [
         SeenIslands(*where, *(int(count) for count in counts[where]))
         for where in np.ndindex(counts.shape[:2])
