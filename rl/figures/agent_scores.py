@@ -12,15 +12,15 @@ from rl.inference.artefacts import read_card
 from rl.policies.actor import weights_name
 from rl.training.run_folder import read_rows, read_run
 
-_SUCCESS = "success_percent", "success_low", "success_high"
-_BURNT = "propellant_percent", "propellant_percent_low", "propellant_percent_high"
+_SUCCESS = "success_percent", "success_tile_low", "success_tile_high"
+_BURNT = "propellant_percent", "propellant_percent_tile_low", "propellant_percent_tile_high"
 _PLAIN = "safe_site_percent", "touchdown_speed_mps"
 _SCORES = "success_percent", "propellant_percent", *_PLAIN
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """A mean over episodes, and its interval.
+    """A mean over episodes, and its interval clustered by tile.
 
     Attributes:
         value: of all episodes.

@@ -9,7 +9,7 @@ from guidance.exports import lazy_exports
 
 if TYPE_CHECKING:
     from rl.policies.actor import AgentPolicy, AgentSite
-    from rl.policies.catalogue import entries
+    from rl.policies.catalogue import entries, policy_from_card
     from rl.policies.recurrent_actor import RecurrentAgentPolicy
 
 _HOMES = {
@@ -17,7 +17,10 @@ _HOMES = {
         "AgentPolicy",
         "AgentSite",
     ),
-    "rl.policies.catalogue": ("entries",),
+    "rl.policies.catalogue": (
+        "entries",
+        "policy_from_card",
+    ),
     "rl.policies.recurrent_actor": ("RecurrentAgentPolicy",),
 }
 
@@ -26,6 +29,7 @@ __all__ = [
     "AgentSite",
     "RecurrentAgentPolicy",
     "entries",
+    "policy_from_card",
 ]
 
 __getattr__, __dir__ = lazy_exports(

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 from hda.policies.adjusted_descent import AdjustedDescent
 from hda.policies.composition import ComposedPolicy
 from hda.policies.entry import PolicyEntry
 from hda.policies.zem_zev import FixedGainZemZev
+from rl.inference.artefacts import read_card
 from rl.policies.actor import AgentPolicy, AgentSite, shipped, weights_name
 from rl.policies.recurrent_actor import RecurrentAgentPolicy
 from rl.settings import WITH_MEMORY
@@ -27,11 +29,24 @@ _AGENTS = {
 }
 
 
+def policy_from_card(name: str, weights: Path) -> AgentPolicy | RecurrentAgentPolicy:
+    """An agent as a policy: with memory where the card of its weights says so.
+
+    Args:
+        name: in tables.
+        weights: file name without suffix; the weights are verified in flight.
+
+    Raises:
+        ArtefactError: the card is missing or damaged.
+    """
+    remembers = read_card(weights.with_suffix(".json"), "actor").get("algorithm") in WITH_MEMORY
+    return (RecurrentAgentPolicy if remembers else AgentPolicy)(name, weights)
+
+
 def _agent(agent: str, preset: str = "paper") -> PolicyEntry:
     """An agent as it was trained on a preset; that of `paper` belongs in every table."""
     name, summary = weights_name(agent, preset), _AGENTS[agent]
-    kind = RecurrentAgentPolicy if agent in WITH_MEMORY else AgentPolicy
-    entry = PolicyEntry(name, lambda: kind(name, shipped(name)), summary)
+    entry = PolicyEntry(name, lambda: policy_from_card(name, shipped(name)), summary)
     if preset == "paper":
         return entry
     return replace(entry, summary=f"{summary}; trained on {preset}", preset=preset)

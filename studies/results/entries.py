@@ -67,8 +67,8 @@ RESULTS: dict[str, Result] = {
     ),
     "agents-lidar": Result(
         "learnt-agents.md",
-        "studies.compare --preset lidar --episodes 500 --policies nearest-safe nearest-safe+convex"
-        " hazard-aware td3 --no-figures --out results/agents_lidar",
+        "studies.compare --preset lidar --policies nearest-safe nearest-safe+convex hazard-aware td3"
+        " --no-figures --out results/agents_lidar",
     ),
     "learnt-agents": Result(
         "learnt-agents.md",

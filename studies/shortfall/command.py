@@ -1,9 +1,10 @@
 """Where policies fall short: what was seen of safe ground before landings that failed, and what moves cost.
 
-Every failed landing is held against the looks before it and against what an encoder keeps of them, which is
-all that an agent sees. Over all flights it counts which islands of safe ground the encodings show, by height
-and area, and which hazards, by height and distance from safe ground. The propellant is parted by flying each
-episode again with the last site known ever later. A policy is a name, or the card (.json) of weights:
+Every landing is held against the looks before it and against what the agents' encoder keeps of them, which is
+all that an agent sees. Over a policy's flights it counts which islands of safe ground the encodings show, by
+height and area, and which hazards, by height and distance from safe ground; safe reads 0.5 or more. The
+propellant is parted by flying each episode again with the last site known ever later. A policy is a name, or
+the card (.json) of weights; agents must see looks, through one encoder:
 
 python -m studies.shortfall --policies td3 nearest-safe+convex
 python -m studies.shortfall --policies runs/weights/td3-convex.json nearest-safe+convex --split tuning
@@ -31,7 +32,7 @@ from studies.campaign.provenance import describe_run, identify_run, write_proven
 from studies.campaign.run_options import FolderOptions
 from studies.columns import console_table, write_csv, write_markdown
 from studies.shortfall.encoded_sight import load_decoder
-from studies.shortfall.flights import FlownEpisode, fly_episode, open_policy
+from studies.shortfall.flights import FlownEpisode, find_encoder, fly_episode, open_policy
 from studies.shortfall.propellant_table import PART_COLUMNS, PartRow, average_parts
 from studies.shortfall.table import (
     HAZARD_COLUMNS,
@@ -63,7 +64,6 @@ class Shortfall(FolderOptions):
         episodes: per policy.
         study_seed: seed of the study; equal seeds give equal episodes.
         split: tile split.
-        encoder: name of the encoder that is asked what it keeps of a look.
         workers: processes that build tiles.
     """
 
@@ -72,7 +72,6 @@ class Shortfall(FolderOptions):
     episodes: int = 1000
     study_seed: int = 0
     split: str = "validation"
-    encoder: str = "autoencoder"
     workers: int = 2
     out: Path = Path("results/shortfall")
 
@@ -83,8 +82,14 @@ class Shortfall(FolderOptions):
         finite_number("study_seed", self.study_seed, at_least=0)
         if not self.policies:
             raise ValueError("policies must name at least one policy")
-        if len({name.removesuffix(".json") for name in self.policies}) < len(self.policies):
-            raise ValueError("policies must be different ones")
+        named: dict[str, str] = {}
+        for policy in self.policies:
+            name = Path(policy).stem if policy.endswith(".json") else policy
+            if name in named:
+                raise ValueError(
+                    f"policies must have different names, got {named[name]!r} and {policy!r}: rename a card"
+                )
+            named[name] = policy
 
 
 @dataclass(frozen=True)
@@ -92,7 +97,7 @@ class Shortfalls:
     """The tables.
 
     Attributes:
-        losses: failed landings.
+        losses: landings and failures.
         shown: flights by what encodings showed of safe ground near the target.
         islands: of safe ground that encodings show.
         hazards: that looks and encodings show.
@@ -111,10 +116,10 @@ def score_flights(flown: dict[str, list[FlownEpisode]]) -> Shortfalls:
     *others, last = flown
     losses = [row for name, flights in flown.items() for row in count_losses(name, flights)]
     shown = [row for name, flights in flown.items() for row in count_shown(name, flights)]
-    every = [flight for flights in flown.values() for flight in flights]
+    islands = [row for name, flights in flown.items() for row in share_islands(name, flights)]
+    hazards = [row for name, flights in flown.items() for row in share_hazards(name, flights)]
     parts = [average_parts(name, flights) for name, flights in flown.items()]
     parts += [average_parts(f"{name} less {last}", flown[name], flown[last]) for name in others]
-    islands, hazards = share_islands(every), share_hazards(every)
     return Shortfalls(tuple(losses), tuple(shown), tuple(islands), tuple(hazards), tuple(parts))
 
 
@@ -126,13 +131,12 @@ def study_shortfall(options: Shortfall) -> Shortfalls:
         ArtefactError: an agent's weights are missing or damaged.
         OSError: the folder cannot be written.
     """
-    preset, decode = find_preset(options.preset), load_decoder(options.encoder)
-    policies = [open_policy(name) for name in options.policies]
+    preset, policies = find_preset(options.preset), [open_policy(name) for name in options.policies]
+    encoder = find_encoder(policies)
+    decode = load_decoder(encoder)
     weights = {name: load_artefact(Path(name).with_suffix(""), "actor").digest for name in _cards(options)}
-    names = ("preset", "study_seed", "split", "encoder")
-    identity = identify_run(
-        Path(__file__).parent, {**{name: getattr(options, name) for name in names}, "weights": weights}
-    )
+    asked = {name: getattr(options, name) for name in ("preset", "study_seed", "split")}
+    identity = identify_run(Path(__file__).parent, {**asked, "encoder": encoder.name, "weights": weights})
     out = open_folder(options.out)
     flown: dict[str, list[FlownEpisode]] = {}
     with open_journal(out, FlownEpisode, _PRODUCTS, identity, options.existing) as journal:
@@ -163,7 +167,7 @@ def study_shortfall(options: Shortfall) -> Shortfalls:
 def _list_tables(scored: Shortfalls) -> tuple[tuple[str, Any, Any, str], ...]:
     """(name, columns, rows, title) of each."""
     return (
-        ("losses", LOSS_COLUMNS, scored.losses, "failed landings"),
+        ("losses", LOSS_COLUMNS, scored.losses, "landings and failures"),
         ("shown", SHOWN_COLUMNS, scored.shown, "flights by what encodings showed near the target"),
         ("islands", ISLAND_COLUMNS, scored.islands, "islands of safe ground in looks"),
         ("hazards", HAZARD_COLUMNS, scored.hazards, "hazards within a shift of the target"),

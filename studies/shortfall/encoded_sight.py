@@ -1,7 +1,8 @@
 """What looks showed of safe and of hazardous ground, and what is left of it in their encodings.
 
 An agent sees the 32 numbers that an encoder makes of a look. What they tell is what the decoder can draw of
-them: ground that the look reads as safe, and the decoded map as a hazard, is lost in the encoding.
+them: ground that the look reads as safe, and the decoded map as a hazard, is lost in the encoding. Safe
+reads a pixel of `SAFE_READING` or more, in both.
 """
 
 from __future__ import annotations
@@ -10,11 +11,13 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from guidance.arrays import Array
+from hda.flight.outcome import Ending
 from hda.flight.record import EpisodeRecord
 from hda.task.observation import Observation
 from hda.task.scenario import ground_point
@@ -28,6 +31,8 @@ DEPTHS = (0.0, 1.0, 2.0, 4.0)
 """[m] from a hazardous cell to the nearest safe one: greatest of each band; 0 is safe ground itself."""
 AREAS = (10.0, 30.0, 100.0, 300.0)
 """[m^2] of an island of safe ground in a look: between the bands that are counted apart."""
+SAME_SITE = 1.0
+"""[m] by which a target moves at least where it is another one."""
 _AROUND = 200.0  # [m] of ground about the first target that a flight can look at
 
 Decoder = Callable[[NDArray[np.float32]], NDArray[np.float32]]
@@ -38,7 +43,7 @@ class Loss(StrEnum):
     """What was seen, before a failed landing, of safe ground within a shift of the target."""
 
     NONE = "it did not fail"
-    NOT_THE_GROUND = "the ground was safe, the flight failed otherwise"
+    NOT_THE_GROUND = "it failed otherwise than on the ground"
     BESIDE = "the site was safe, the touchdown beside it was not"
     NONE_READ = "no look read safe ground within a shift of the target"
     LOST = "looks read safe ground within a shift, no encoding showed any"
@@ -50,12 +55,10 @@ class SiteSight:
     """What one look said of a place.
 
     Attributes:
-        time: [s] of the look.
         read: safety that its pixel read.
         encoded: safety that is left of it in the encoding.
     """
 
-    time: float
     read: float
     encoded: float
 
@@ -77,10 +80,12 @@ class NearSight:
 class SeenIslands:
     """Islands of safe ground in the looks of one band of heights: pixels that touch, corners count.
 
+    Those that touch the limit of what a look read are left out: they may be parts of larger ones.
+
     Attributes:
         height: number of the band in `HEIGHTS`.
         area: number of the band in `AREAS`.
-        islands: that the looks read.
+        islands: that lie wholly in what the looks read.
         shown: of these, those of which the encoding shows a pixel at least as safe.
     """
 
@@ -174,20 +179,27 @@ def count_hazards(
     ]
 
 
-def trace_site(record: EpisodeRecord, decoded: NDArray[np.float32]) -> list[SiteSight]:
-    """What each look that read the ground at a flight's last site said of it, in order.
+def sight_choice(record: EpisodeRecord, decoded: NDArray[np.float32]) -> SiteSight | None:
+    """What the look on which the last site was chosen said of it; None where it did not read that ground.
+
+    Chosen is a site at the first decision from which the target stays within `SAME_SITE` of it.
 
     Args:
         record: the flight.
         decoded: as of `count_hazards`.
     """
-    site, sights = record.decisions[-1].site, []
-    for index, observation in enumerate(record.observations):
-        pixel = observation.pixel(site)
-        if pixel is not None and read_pixels(record, index)[2][pixel]:
-            read, encoded = float(observation.safety_map[pixel]), float(decoded[index][pixel])
-            sights.append(SiteSight(observation.time, read, encoded))
-    return sights
+    site = record.decisions[-1].site
+    away = [
+        index
+        for index, decision in enumerate(record.decisions)
+        if np.linalg.norm(decision.site[:2] - site[:2]) >= SAME_SITE
+    ]
+    index = away[-1] + 1 if away else 0
+    observation = record.observations[index]
+    pixel = observation.pixel(site)
+    if pixel is None or not read_pixels(record, index)[2][pixel]:
+        return None
+    return SiteSight(float(observation.safety_map[pixel]), float(decoded[index][pixel]))
 
 
 def count_islands(record: EpisodeRecord, decoded: NDArray[np.float32]) -> list[SeenIslands]:
@@ -197,18 +209,20 @@ def count_islands(record: EpisodeRecord, decoded: NDArray[np.float32]) -> list[S
         record: the flight.
         decoded: as of `count_hazards`.
     """
-    from scipy.ndimage import label
+    from scipy.ndimage import binary_erosion, label
 
+    touching = np.ones((3, 3))
     counts: NDArray[np.int_] = np.zeros((len(HEIGHTS) + 1, len(AREAS) + 1, 2), dtype=int)
     for index, observation in enumerate(record.observations):
-        safe = read_pixels(record, index)[2] & (observation.safety_map >= SAFE_READING)
-        number: NDArray[np.int_] = label(safe, np.ones((3, 3)))[0]  # type: ignore[index]
-        islands = int(number.max()) + 1
-        pixels = np.bincount(number[safe], minlength=islands)[1:]
-        shown = np.bincount(number[safe & (decoded[index] >= SAFE_READING)], minlength=islands)[1:]
-        area = np.searchsorted(AREAS, pixels * observation.pixel_size**2)
-        for column, kept in enumerate((area, area[shown > 0])):
-            counts[_band_of(observation), :, column] += np.bincount(kept, minlength=len(AREAS) + 1)
+        read = read_pixels(record, index)[2]
+        safe = read & (observation.safety_map >= SAFE_READING)
+        number: NDArray[np.int_] = label(safe, touching)[0]  # type: ignore[index]
+        limit, kept = safe & np.logical_not(binary_erosion(read, touching)), decoded[index] >= SAFE_READING
+        cells = (number[part] for part in (safe, safe & kept, limit))
+        pixels, shown, cut = (np.bincount(one, minlength=int(number.max()) + 1)[1:] for one in cells)
+        area, shown = np.searchsorted(AREAS, pixels[cut == 0] * observation.pixel_size**2), shown[cut == 0]
+        for column, bands in enumerate((area, area[shown > 0])):
+            counts[_band_of(observation), :, column] += np.bincount(bands, minlength=len(AREAS) + 1)
     return [
         SeenIslands(*where, *(int(count) for count in counts[where]))
         for where in np.ndindex(counts.shape[:2])
@@ -232,7 +246,7 @@ def measure_near(record: EpisodeRecord, decoded: NDArray[np.float32]) -> list[Ne
 
 
 def explain_loss(record: EpisodeRecord, near: Sequence[NearSight]) -> Loss:
-    """Why a flight did not land on safe ground, where it failed.
+    """Why a flight did not land on safe ground, where it failed; only `unsafe-site` is the ground's.
 
     Args:
         record: the flight.
@@ -240,7 +254,7 @@ def explain_loss(record: EpisodeRecord, near: Sequence[NearSight]) -> Loss:
     """
     if record.outcome.success:
         return Loss.NONE
-    if record.outcome.safe_site:
+    if record.outcome.ending is not Ending.UNSAFE_SITE:
         return Loss.NOT_THE_GROUND
     if record.scenario.tile.is_safe(ground_point(record.scenario, record.decisions[-1].site)):
         return Loss.BESIDE
@@ -260,24 +274,22 @@ def _within_shift(observation: Observation) -> NDArray[np.bool_]:
     return near[:, None] & near[None, :]
 
 
-def load_decoder(encoder: str) -> Decoder:
+def load_decoder(encoder: Path) -> Decoder:
     """The shipped encoder and its decoder, one behind the other.
 
     Args:
-        encoder: its name.
+        encoder: where its weights stand, without suffix.
 
     Raises:
         TrainingLibrariesError: torch, which decodes, is not installed.
-        ValueError: there is no encoder of that name.
     """
-    from rl.inference.latent import encoder_path, load_autoencoder
+    from rl.inference.latent import load_autoencoder
     from rl.training_libraries import require_training_libraries
 
-    path = encoder_path(encoder)
     require_training_libraries()
     from rl.learning.autoencoder import autoencoder_from_tensors, reconstruct
 
-    network = autoencoder_from_tensors(load_autoencoder(path).tensors)
+    network = autoencoder_from_tensors(load_autoencoder(encoder).tensors)
 
     def decode(maps: NDArray[np.float32]) -> NDArray[np.float32]:
         return reconstruct(network, np.round(maps * 255.0).astype(np.uint8))

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from hda.flight.episode import fly
+from hda.policies.composition import ComposedPolicy
 from hda.policies.entry import AnyPolicy
 from hda.registry import make_policy
 from hda.task.scenario import Scenario
-from rl.inference.artefacts import load_artefact
-from rl.policies.actor import AgentPolicy
+from rl.inference.artefacts import read_card
+from rl.inference.latent import encoder_of_card
+from rl.policies.actor import AgentPolicy, AgentSite
+from rl.policies.catalogue import policy_from_card
 from rl.policies.recurrent_actor import RecurrentAgentPolicy
-from rl.settings import WITH_MEMORY
-from studies.failures.causes import SAFE_READING
 from studies.shortfall.encoded_sight import (
     Decoder,
     Loss,
@@ -29,7 +30,7 @@ from studies.shortfall.encoded_sight import (
     explain_loss,
     measure_depth,
     measure_near,
-    trace_site,
+    sight_choice,
 )
 from studies.shortfall.propellant_parts import PropellantParts, part_propellant
 
@@ -42,7 +43,7 @@ class FlownEpisode:
         tile: number of the tile.
         loss: what was seen of the ground that it failed on, or that it did not fail.
         depth: [m] from the cell of the touchdown to the nearest safe one; 0 on safe ground.
-        sights: of the last site, of a failure.
+        chosen: what the look on which the last site was chosen said of it; empty where it did not read it.
         near: safe ground in each look within a shift of the target.
         hazards: in its looks.
         islands: of safe ground in its looks.
@@ -52,17 +53,11 @@ class FlownEpisode:
     tile: int
     loss: Loss
     depth: float
-    sights: tuple[SiteSight, ...]
+    chosen: tuple[SiteSight, ...]
     near: tuple[NearSight, ...]
     hazards: tuple[SeenHazards, ...]
     islands: tuple[SeenIslands, ...]
     parts: PropellantParts
-
-    @property
-    def warned(self) -> float:
-        """[s] from the first look whose encoding showed the last site as a hazard to the end; nan without."""
-        shown = [sight.time for sight in self.sights if sight.encoded < SAFE_READING]
-        return self.parts.time - shown[0] if shown else math.nan
 
 
 def open_policy(name: str) -> AnyPolicy:
@@ -70,15 +65,49 @@ def open_policy(name: str) -> AnyPolicy:
 
     Raises:
         ValueError: the name is unknown.
-        ArtefactError: the weights are missing or damaged.
+        ArtefactError: the card is missing or damaged.
     """
     import rl  # noqa: F401 - registers the agents
 
     if not name.endswith(".json"):
         return make_policy(name)
     weights = Path(name).with_suffix("")
-    remembers = load_artefact(weights, "actor").card.get("algorithm") in WITH_MEMORY
-    return (RecurrentAgentPolicy if remembers else AgentPolicy)(weights.name, weights)
+    return policy_from_card(weights.name, weights)
+
+
+def find_encoder(policies: Iterable[AnyPolicy]) -> Path:
+    """Where the weights of the encoder stand, without suffix, that the agents among policies see through.
+
+    Raises:
+        ValueError: an agent sees beliefs, none is an agent, or two have different encoders.
+        ArtefactError: a card is missing, damaged, or of an encoder that is not shipped.
+    """
+    encoders: dict[Path, str] = {}
+    for policy in policies:
+        weights = _weights_of(policy)
+        if weights is not None:
+            path = weights.with_suffix(".json")
+            card = read_card(path, "actor")
+            if card.get("sight", "look") != "look":
+                raise ValueError(
+                    f"policies must see looks, and {policy.name} sees beliefs: take another agent"
+                )
+            encoders.setdefault(encoder_of_card(card, path), policy.name)
+    if len(encoders) != 1:
+        named = ", ".join(f"{encoder.name} of {name}" for encoder, name in encoders.items()) or "none"
+        raise ValueError(
+            f"policies must name an agent, and agents of one encoder alone, got {named}: "
+            "study agents of different encoders one by one"
+        )
+    return next(iter(encoders))
+
+
+def _weights_of(policy: AnyPolicy) -> Path | None:
+    """Where an agent's weights stand, without suffix; None of what is no agent."""
+    if isinstance(policy, ComposedPolicy):
+        selection = policy.site_selection
+        return selection.weights if isinstance(selection, AgentSite) else None
+    return policy.weights if isinstance(policy, (AgentPolicy, RecurrentAgentPolicy)) else None
 
 
 def fly_episode(policy: AnyPolicy, scenario: Scenario, decode: Decoder) -> FlownEpisode:
@@ -93,7 +122,7 @@ def fly_episode(policy: AnyPolicy, scenario: Scenario, decode: Decoder) -> Flown
         tile=scenario.tile.number,
         loss=explain_loss(record, near),
         depth=float(depth.read(row, column)[0]),
-        sights=() if outcome.success else tuple(trace_site(record, decoded)),
+        chosen=() if (sight := sight_choice(record, decoded)) is None else (sight,),
         near=near,
         hazards=tuple(count_hazards(record, decoded, depth)),
         islands=tuple(count_islands(record, decoded)),

@@ -3,7 +3,8 @@
 An episode is flown again by convex guidance with the last site known from the start, then with the flight's
 own first site and the last one from the second look on, and so on. What one flight of this row burns more
 than the one before it is the price of not aiming at the last site over one interval. What the flight itself
-burns more than the last of the row is its guidance's: nothing where it flew the same law.
+burns more than the last of the row is its guidance's: nothing where it flew the same law, `AdjustedDescent`,
+as agents with convex guidance do. Rules fly `PlannedDescent`, which plans anew for every site.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ class ForeseenSite:
 
 @dataclass(frozen=True)
 class Move:
-    """A decision that did not aim at the last site.
+    """One decision of a flight; it costs nothing from the one on that chose the last site.
 
     Attributes:
         height: [m] of the lander above the target.

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from studies.columns import Column
+from studies.shortfall.encoded_sight import SAME_SITE
 from studies.shortfall.flights import FlownEpisode
 from studies.shortfall.propellant_parts import PropellantParts
 from studies.shortfall.table import EARLY
@@ -21,8 +22,10 @@ class PartRow:
 
     Attributes:
         policy: name, or both.
-        whole: [%] propellant, clustered by tile, as are the other three parts of it.
+        whole: [%] propellant, clustered by tile, as are its parts.
+            `direct`, `early`, `late` and `guidance` add up to it.
         direct: [%] with the last site known from the start.
+        first: [%] for the site of the first look, which `early` counts in.
         early: [%] for sites that were not the last, above `EARLY`.
         late: [%] below.
         guidance: [%] for another guidance law.
@@ -35,6 +38,7 @@ class PartRow:
     policy: str
     whole: Interval
     direct: Interval
+    first: Interval
     early: Interval
     late: Interval
     guidance: Interval
@@ -52,17 +56,17 @@ def average_parts(
     values = np.array([_numbers(flight.parts) for flight in flown])
     if beside is not None:
         values -= np.array([_numbers(flight.parts) for flight in beside])
-    intervals = [mean_intervals(collect_moments(part, tiles), 0)[1] for part in values.T[:5]]
-    whole, direct, early, late, guidance = intervals
-    moves, moved, offset, time = values[:, 5:].mean(axis=0).tolist()
-    return PartRow(policy, whole, direct, early, late, guidance, moves, moved, offset, time)
+    intervals = [mean_intervals(collect_moments(part, tiles), 0)[1] for part in values.T[:6]]
+    whole, direct, first, early, late, guidance = intervals
+    moves, moved, offset, time = values[:, 6:].mean(axis=0).tolist()
+    return PartRow(policy, whole, direct, first, early, late, guidance, moves, moved, offset, time)
 
 
 def _numbers(parts: PropellantParts) -> list[float]:
     early = sum(move.cost for move in parts.moves if move.height >= EARLY)
     late = sum(move.cost for move in parts.moves if move.height < EARLY)
-    lengths = [move.length for move in parts.moves if move.length >= 1.0]
-    spent = [parts.whole, parts.direct, early, late, parts.guidance]
+    lengths = [move.length for move in parts.moves if move.length >= SAME_SITE]
+    spent = [parts.whole, parts.direct, parts.moves[0].cost, early, late, parts.guidance]
     return [*spent, len(lengths), sum(lengths), parts.offset, parts.time]
 
 
@@ -81,6 +85,14 @@ PART_COLUMNS: tuple[Column[PartRow], ...] = (
         "early_percent",
         f"other sites above {EARLY:g} m",
         lambda row: row.early,
+        digits=2,
+        unit="%",
+        interval=True,
+    ),
+    Column(
+        "first_percent",
+        "of these the first look's",
+        lambda row: row.first,
         digits=2,
         unit="%",
         interval=True,

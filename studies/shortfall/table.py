@@ -1,4 +1,4 @@
-"""Tables of what was seen: failed landings, islands of safe ground and hazards by height."""
+"""Tables of what was seen: landings and failures, islands of safe ground and hazards by height."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from studies.campaign.score import scaled
 from studies.columns import Column
+from studies.failures.causes import SAFE_READING
 from studies.shortfall.encoded_sight import (
     AREAS,
     DEPTHS,
@@ -23,36 +24,40 @@ from studies.statistics.ratios import Interval, clustered_count_interval
 
 SHOWN = (0.0, 100.0, 300.0)
 """[m^2] of safe ground near the target: between the bands of flights that are counted apart."""
+FAILED = "every failure"
 EARLY = 400.0
 """[m] above the target from which a look or a move counts as early."""
 
 
 @dataclass(frozen=True)
 class LossRow:
-    """Failed flights of a policy with one cause.
+    """Flights of a policy with one end: those that landed are the base rate of the others.
 
     Attributes:
         policy: name.
-        loss: what was seen.
-        failed: how many.
+        seen: `Loss` in words, or `FAILED`.
+        flights: how many.
         episodes: that it flew.
         tiles: on how many tiles they fell.
-        depth: [m] median distance of the touchdowns from safe ground.
+        depth: [m] median distance of the touchdowns from safe ground, of those with some near; else nan.
         read: [m^2] median of the most safe ground within a shift of the target in a look of the flight.
         encoded: [m^2] the same of what an encoding showed.
-        warned: [s] median time from the first look whose encoding showed the last site as a hazard to the
-            touchdown; nan where none did.
+        chosen: how many chose their last site on a look that read it.
+        refused: of these, those where that look read it as a hazard.
+        warned: of these, those where the encoding of that look showed it as one.
     """
 
     policy: str
-    loss: Loss
-    failed: int
+    seen: str
+    flights: int
     episodes: int
     tiles: int
     depth: float
     read: float
     encoded: float
-    warned: float
+    chosen: int
+    refused: int
+    warned: int
 
 
 @dataclass(frozen=True)
@@ -75,15 +80,17 @@ class ShownRow:
 
 @dataclass(frozen=True)
 class IslandRow:
-    """Islands of safe ground in looks, of one band of heights and areas.
+    """Islands of safe ground in a policy's looks, of one band of heights and areas.
 
     Attributes:
+        policy: name.
         height: number of the band of heights.
         area: number of the band of areas.
         islands: how many.
         shown: share of which the encodings show a pixel, clustered by tile.
     """
 
+    policy: str
     height: int
     area: int
     islands: int
@@ -92,9 +99,10 @@ class IslandRow:
 
 @dataclass(frozen=True)
 class HazardRow:
-    """Pixels of one band of heights and depths that the policies could have moved their target to.
+    """Pixels of one band of heights and depths that a policy could have moved its target to.
 
     Attributes:
+        policy: name.
         height: number of the band of heights.
         depth: number of the band of depths.
         pixels: how many.
@@ -102,6 +110,7 @@ class HazardRow:
         encoded: share that their encodings show as hazard, clustered by tile.
     """
 
+    policy: str
     height: int
     depth: int
     pixels: int
@@ -110,26 +119,28 @@ class HazardRow:
 
 
 def count_losses(policy: str, flown: Sequence[FlownEpisode]) -> list[LossRow]:
-    """Failed flights by cause, in the order of `Loss`; causes without any are left out."""
-    rows = []
-    for loss in Loss:
-        failed = [flight for flight in flown if flight.loss is loss]
-        if failed and loss is not Loss.NONE:
-            warned = [time for flight in failed if not math.isnan(time := flight.warned)]
-            rows.append(
-                LossRow(
-                    policy,
-                    loss,
-                    len(failed),
-                    len(flown),
-                    len({flight.tile for flight in failed}),
-                    median(flight.depth for flight in failed),
-                    median(max(sight.read for sight in flight.near) for flight in failed),
-                    median(max(sight.encoded for sight in flight.near) for flight in failed),
-                    median(warned) if warned else math.nan,
-                )
-            )
-    return rows
+    """Flights by what was seen, in the order of `Loss`, then all that failed; what none is of is left out."""
+    kinds = {loss.value: [flight for flight in flown if flight.loss is loss] for loss in Loss}
+    kinds[FAILED] = [flight for flight in flown if flight.loss is not Loss.NONE]
+    return [_count_loss(policy, seen, some, len(flown)) for seen, some in kinds.items() if some]
+
+
+def _count_loss(policy: str, seen: str, flights: Sequence[FlownEpisode], episodes: int) -> LossRow:
+    depths = [flight.depth for flight in flights if math.isfinite(flight.depth)]
+    chosen = [sight for flight in flights for sight in flight.chosen]
+    return LossRow(
+        policy,
+        seen,
+        len(flights),
+        episodes,
+        len({flight.tile for flight in flights}),
+        median(depths) if depths else math.nan,
+        median(max(sight.read for sight in flight.near) for flight in flights),
+        median(max(sight.encoded for sight in flight.near) for flight in flights),
+        len(chosen),
+        sum(sight.read < SAFE_READING for sight in chosen),
+        sum(sight.encoded < SAFE_READING for sight in chosen),
+    )
 
 
 def count_shown(policy: str, flown: Sequence[FlownEpisode]) -> list[ShownRow]:
@@ -154,7 +165,7 @@ def count_shown(policy: str, flown: Sequence[FlownEpisode]) -> list[ShownRow]:
     ]
 
 
-def share_islands(flown: Sequence[FlownEpisode]) -> list[IslandRow]:
+def share_islands(policy: str, flown: Sequence[FlownEpisode]) -> list[IslandRow]:
     """Shares of islands that encodings show, by height, the greatest first, and area."""
     counts = [
         (flight.tile, (seen.height, seen.area), (seen.islands, seen.shown))
@@ -162,12 +173,12 @@ def share_islands(flown: Sequence[FlownEpisode]) -> list[IslandRow]:
         for seen in flight.islands
     ]
     return [
-        IslandRow(*band, int(islands.sum()), clustered_count_interval(shown, islands))
+        IslandRow(policy, *band, int(islands.sum()), clustered_count_interval(shown, islands))
         for band, (islands, shown) in _sum_bands(counts)
     ]
 
 
-def share_hazards(flown: Sequence[FlownEpisode]) -> list[HazardRow]:
+def share_hazards(policy: str, flown: Sequence[FlownEpisode]) -> list[HazardRow]:
     """Shares of hazards that looks and encodings show, by height, the greatest first, and depth."""
     counts = [
         (flight.tile, (seen.height, seen.depth), (seen.pixels, seen.read, seen.encoded))
@@ -176,6 +187,7 @@ def share_hazards(flown: Sequence[FlownEpisode]) -> list[HazardRow]:
     ]
     return [
         HazardRow(
+            policy,
             *band,
             int(pixels.sum()),
             clustered_count_interval(read, pixels),
@@ -206,14 +218,16 @@ def _band(edges: Sequence[float], number: int) -> str:
 
 LOSS_COLUMNS: tuple[Column[LossRow], ...] = (
     Column("policy", "policy", lambda row: row.policy, words=True),
-    Column("seen", "what was seen", lambda row: row.loss.value, words=True),
-    Column("failed", "failed", lambda row: row.failed),
+    Column("seen", "what was seen", lambda row: row.seen, words=True),
+    Column("flights", "flights", lambda row: row.flights),
     Column("episodes", "of", lambda row: row.episodes),
     Column("tiles", "tiles", lambda row: row.tiles),
     Column("depth_m", "from safe ground", lambda row: row.depth, digits=1, unit="m"),
     Column("read_m2", "safe ground read", lambda row: row.read, digits=0, unit="m²"),
     Column("encoded_m2", "encoded", lambda row: row.encoded, digits=0, unit="m²"),
-    Column("warned_s", "hazard shown before touchdown", lambda row: row.warned, digits=1, unit="s"),
+    Column("chosen", "last site chosen on a look of it", lambda row: row.chosen),
+    Column("refused", "look read a hazard", lambda row: row.refused),
+    Column("warned", "encoding showed one", lambda row: row.warned),
 )
 """losses.csv, losses.md and the console read this list."""
 
@@ -231,6 +245,7 @@ SHOWN_COLUMNS: tuple[Column[ShownRow], ...] = (
 """shown.csv, shown.md and the console read this list."""
 
 ISLAND_COLUMNS: tuple[Column[IslandRow], ...] = (
+    Column("policy", "policy", lambda row: row.policy, words=True),
     Column("height_m", "height m", lambda row: _band(HEIGHTS, row.height), words=True),
     Column("area_m2", "island m²", lambda row: _band(AREAS, row.area), words=True),
     Column("islands", "islands read", lambda row: row.islands),
@@ -246,6 +261,7 @@ ISLAND_COLUMNS: tuple[Column[IslandRow], ...] = (
 """islands.csv, islands.md and the console read this list."""
 
 HAZARD_COLUMNS: tuple[Column[HazardRow], ...] = (
+    Column("policy", "policy", lambda row: row.policy, words=True),
     Column("height_m", "height m", lambda row: _band(HEIGHTS, row.height), words=True),
     Column(
         "depth_m",

@@ -17,8 +17,8 @@ from rl.policies.actor import weights_name
 from tests.drawing import bar_ends, legend_words, line_data
 
 HEAD = (
-    "policy,preset,episodes,safe_site_percent,touchdown_speed_mps,success_percent,success_low,success_high,"
-    "propellant_percent,propellant_percent_low,propellant_percent_high\n"
+    "policy,preset,episodes,safe_site_percent,touchdown_speed_mps,success_percent,success_tile_low,"
+    "success_tile_high,propellant_percent,propellant_percent_tile_low,propellant_percent_tile_high\n"
 )
 
 

@@ -1,4 +1,4 @@
-"""The shortfall study: what was seen of the ground, and parts that add up to the propellant."""
+"""The shortfall study: what was seen of the ground, its tables and its command."""
 
 import csv
 import math
@@ -12,10 +12,12 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from hda.flight.episode import fly
+from hda.flight.outcome import Ending
 from hda.flight.record import EpisodeRecord
 from hda.registry import make_policy
 from hda.task.scenario import sample_scenario
-from rl.inference.artefacts import WEIGHTS_FOLDER, ArtefactError
+from rl.inference.artefacts import WEIGHTS_FOLDER, ArtefactError, load_artefact, save_artefact
+from studies.failures.readings import read_pixels
 from studies.shortfall.command import Shortfall, study_shortfall
 from studies.shortfall.encoded_sight import (
     AREAS,
@@ -31,12 +33,12 @@ from studies.shortfall.encoded_sight import (
     explain_loss,
     measure_depth,
     measure_near,
-    trace_site,
+    sight_choice,
 )
-from studies.shortfall.flights import FlownEpisode, open_policy
-from studies.shortfall.propellant_parts import ForeseenSite, Move, PropellantParts, part_propellant
+from studies.shortfall.flights import FlownEpisode, find_encoder, open_policy
+from studies.shortfall.propellant_parts import Move, PropellantParts
 from studies.shortfall.propellant_table import average_parts
-from studies.shortfall.table import count_losses, count_shown, share_hazards, share_islands
+from studies.shortfall.table import FAILED, count_losses, count_shown, share_hazards, share_islands
 
 
 @pytest.fixture(scope="module")
@@ -95,19 +97,23 @@ def test_a_flight_that_did_not_fail_on_its_site_is_none_of_these(
     hard = replace(planned, outcome=replace(planned.outcome, success=False))
     assert explain_loss(planned, []) is Loss.NONE
     assert explain_loss(hard, []) is Loss.NOT_THE_GROUND
+    crashed = replace(failed, outcome=replace(failed.outcome, ending=Ending.CRASH, safe_site=False))
+    assert explain_loss(crashed, []) is Loss.NOT_THE_GROUND
     beside = replace(failed, decisions=planned.decisions, scenario=planned.scenario)
     assert is_safe_at_the_site(beside)
     assert explain_loss(beside, []) is Loss.BESIDE
 
 
 def test_islands_are_counted_by_their_area_and_what_is_kept_of_them(planned: EpisodeRecord) -> None:
-    """Two islands drawn into the first look, 2 x 2 pixels that touch a third and one pixel far away."""
+    """Islands drawn into the first look: 2 x 2 pixels that touch a third, one far away, one at the edge."""
     first = planned.observations[0]
     drawn = np.zeros_like(first.safety_map)
     middle = drawn.shape[0] // 2
     drawn[middle : middle + 2, middle : middle + 2] = 1.0
     drawn[middle + 2, middle + 2] = 0.9
     drawn[middle, middle + 6] = 0.8
+    rows, columns = np.nonzero(read_pixels(planned, 0)[2])
+    drawn[rows[0], columns[0]] = 1.0
     seen = replace(planned, observations=(replace(first, safety_map=drawn),))
     kept = np.zeros_like(drawn)
     kept[middle + 2, middle + 2] = 0.5
@@ -119,6 +125,8 @@ def test_islands_are_counted_by_their_area_and_what_is_kept_of_them(planned: Epi
     assert counts[small] == SeenIslands(len(HEIGHTS), small, 1, 0)
     (near,) = measure_near(seen, kept[None])
     assert near == NearSight(pytest.approx(6.0 * pixel), pytest.approx(pixel))
+    inside = replace(first, safety_map=np.ones_like(drawn))
+    assert count_islands(replace(planned, observations=(inside,)), drawn[None]) == []
     every = count_islands(planned, maps_of(planned))
     assert all(0 < one.islands == one.shown for one in every)
 
@@ -137,53 +145,52 @@ def test_an_encoding_that_keeps_everything_shows_what_the_look_reads(planned: Ep
     assert max(seen.height for seen in counts) == len(HEIGHTS)
 
 
-def test_a_site_is_traced_through_the_looks_that_read_it(planned: EpisodeRecord) -> None:
-    maps = maps_of(planned)
-    sights = trace_site(planned, 0.5 * maps)
-    assert 2 <= len(sights) <= len(planned.observations)
-    assert [sight.encoded for sight in sights] == [0.5 * sight.read for sight in sights]
-    assert sights[-1].read > 0.95
+def test_a_site_is_looked_up_in_the_look_on_which_it_was_chosen(planned: EpisodeRecord) -> None:
+    """A site that is left and taken again is chosen again; one within a metre is the same."""
+    maps, last = maps_of(planned), planned.decisions[-1]
+    for looks in (1, 3):
+        others = (planned.decisions[0],) * looks
+        apart = replace(planned, decisions=(last, *others, *(last,) * (len(maps) - looks - 1)))
+        assert sight_of(planned, looks + 1) == sight_choice(apart, 0.5 * maps)
+    near = replace(planned.decisions[0], site=last.site + np.array([0.6, -0.6, 0.0]))
+    moved = replace(planned, decisions=(near, *(last,) * (len(maps) - 1)))
+    assert sight_choice(moved, 0.5 * maps) == sight_of(planned, 0)
+    away = replace(last, site=last.site + np.array([900.0, 0.0, 0.0]))
+    assert sight_choice(replace(planned, decisions=(away,) * len(maps)), maps) is None
 
 
-def test_a_site_is_foreseen_from_its_look_on_and_beyond_the_flight(planned: EpisodeRecord) -> None:
-    sites = tuple(decision.site for decision in planned.decisions)
-    for known in (0, 2, len(sites) + 3):
-        selection = ForeseenSite(sites, known)
-        for k in range(len(sites) + 2):
-            site, memory = selection.select(replace(planned.observations[0], index=k), None)
-            assert memory is None
-            assert site is (sites[k] if k < min(known, len(sites)) else sites[-1])
-
-
-def test_the_parts_add_up_and_the_flight_that_foresees_nothing_is_the_flight(planned: EpisodeRecord) -> None:
-    parts = part_propellant(planned)
-    spent = parts.direct + sum(move.cost for move in parts.moves) + parts.guidance
-    assert spent == pytest.approx(parts.whole, abs=1e-9)
-    assert parts.whole == 100.0 * planned.outcome.propellant_fraction
-    assert [move.cost for move in parts.moves][-1] == 0.0
-    assert any(move.cost != 0.0 for move in parts.moves)
-    adjusted = fly(make_policy("td3+convex"), planned.scenario)
-    assert part_propellant(adjusted).guidance == pytest.approx(0.0, abs=1e-9)
+def sight_of(record: EpisodeRecord, look: int) -> SiteSight:
+    """What a look says of the last site, half of it encoded."""
+    pixel = record.observations[look].pixel(record.decisions[-1].site)
+    assert pixel is not None
+    read = float(record.observations[look].safety_map[pixel])
+    return SiteSight(read, 0.5 * read)
 
 
 def flight(loss: Loss, tile: int, whole: float = 60.0) -> FlownEpisode:
     moves = (Move(900.0, 40.0, 1.0), Move(300.0, 0.5, 0.25))
     parts = PropellantParts(whole, whole - 1.75, moves, 0.5, 40.0, 28.0)
-    sights = (SiteSight(5.0, 0.4, 0.9), SiteSight(10.0, 0.1, 0.2))
+    chosen = (SiteSight(0.9, 0.2),) if tile == 2 else ()
     near = (NearSight(20.0, 1.0), NearSight(9.0, 7.0))
     hazards, islands = (SeenHazards(4, 1, 10, 9, 6),), (SeenIslands(4, 0, 3, 1), SeenIslands(3, 2, 1, 1))
-    return FlownEpisode(tile, loss, 3.0, sights, near, hazards, islands, parts)
+    return FlownEpisode(tile, loss, 3.0, chosen, near, hazards, islands, parts)
 
 
 def test_tables_count_average_and_compare() -> None:
     flown = [flight(Loss.NONE, 1), flight(Loss.PASSED, 1), flight(Loss.PASSED, 2), flight(Loss.LOST, 2)]
     rows = count_losses("one", flown)
-    assert [(row.loss, row.failed, row.tiles, row.episodes) for row in rows] == [
-        (Loss.LOST, 1, 1, 4),
-        (Loss.PASSED, 2, 2, 4),
+    assert [(row.seen, row.flights, row.tiles, row.episodes) for row in rows] == [
+        (Loss.NONE.value, 1, 1, 4),
+        (Loss.LOST.value, 1, 1, 4),
+        (Loss.PASSED.value, 2, 2, 4),
+        (FAILED, 3, 2, 4),
     ]
-    assert {(row.depth, row.read, row.encoded, row.warned) for row in rows} == {(3.0, 20.0, 7.0, 18.0)}
-    (seen,) = share_hazards(flown)
+    assert {(row.depth, row.read, row.encoded) for row in rows} == {(3.0, 20.0, 7.0)}
+    assert [(row.chosen, row.refused, row.warned) for row in rows] == [(k, 0, k) for k in (0, 1, 1, 2)]
+    far = [replace(one, depth=depth) for one, depth in zip(flown, (0, math.inf, math.nan, 8.0), strict=True)]
+    assert [row.depth for row in count_losses("one", far)] == pytest.approx([0, 8, math.nan, 8], nan_ok=True)
+    (seen,) = share_hazards("one", flown)
+    assert seen.policy == "one"
     assert (seen.height, seen.depth, seen.pixels) == (4, 1, 40)
     assert (seen.read.estimate, seen.encoded.estimate) == pytest.approx((0.9, 0.6))
     many = [
@@ -195,17 +202,12 @@ def test_tables_count_average_and_compare() -> None:
         (1, 1, 1),
         (3, 1, 1),
     ]
-    shares = [(row.height, row.area, row.islands, row.shown.estimate) for row in share_islands(flown)]
+    shares = [(row.height, row.area, row.islands, row.shown.estimate) for row in share_islands("one", flown)]
     assert shares == [(4, 0, 12, pytest.approx(1.0 / 3.0)), (3, 2, 4, 1.0)]
     cheap = [flight(Loss.NONE, each.tile, 58.5) for each in flown]
     row = average_parts("one", flown)
-    assert [part.estimate for part in (row.whole, row.direct, row.early, row.late, row.guidance)] == [
-        60.0,
-        58.25,
-        1.0,
-        0.25,
-        0.5,
-    ]
+    assert (row.whole.estimate, row.direct.estimate, row.guidance.estimate) == (60.0, 58.25, 0.5)
+    assert (row.first.estimate, row.early.estimate, row.late.estimate) == (1.0, 1.0, 0.25)
     assert (row.moves, row.moved, row.offset, row.time) == (1.0, 40.0, 40.0, 28.0)
     less = average_parts("one less two", flown, cheap)
     assert (less.whole.estimate, less.direct.estimate, less.early.estimate) == (1.5, 1.5, 0.0)
@@ -222,8 +224,25 @@ def test_a_card_is_a_policy_and_what_is_neither_is_named(tmp_path: Path) -> None
         open_policy("td33")
     with pytest.raises(ValueError, match="policies must name at least one"):
         Shortfall(policies=())
-    with pytest.raises(ValueError, match="policies must be different ones"):
-        Shortfall(policies=("td3", "td3"))
+    for pair in (("td3", "td3"), ("runs/a/td3.json", "runs/b/td3.json"), ("runs/td3.json", "td3")):
+        with pytest.raises(ValueError, match=f"different names, got '{pair[0]}' and '{pair[1]}'"):
+            Shortfall(policies=pair)
+
+
+def test_the_encoder_is_the_one_that_the_agents_see_through(tmp_path: Path) -> None:
+    names = ("td3", "nearest-safe+convex", "td3+convex", "td3-lstm")
+    policies = {name: open_policy(name) for name in (*names, "td3-lidar")}
+    assert find_encoder([policies[name] for name in names]).name == "autoencoder"
+    assert find_encoder([policies["td3-lidar"]]).name == "autoencoder-lidar"
+    with pytest.raises(ValueError, match="autoencoder of td3, autoencoder-lidar of td3-lidar"):
+        find_encoder([policies["td3"], policies["td3-lidar"]])
+    with pytest.raises(ValueError, match=r"policies must name an agent.* got none"):
+        find_encoder([policies["nearest-safe+convex"]])
+    agent = load_artefact(WEIGHTS_FOLDER / "td3", "actor")
+    card = {**agent.card, "sight": "belief"}
+    save_artefact(tmp_path / "seer", "actor", agent.tensors, card)
+    with pytest.raises(ValueError, match="policies must see looks, and seer sees beliefs"):
+        find_encoder([open_policy(str(tmp_path / "seer.json"))])
 
 
 @pytest.mark.slow
