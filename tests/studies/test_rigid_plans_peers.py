@@ -5,7 +5,6 @@ What needs the package itself runs where it is installed (extra `peers`); nothin
 
 import json
 import math
-import platform
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -17,23 +16,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from guidance import solve_pdg_6dof
-from guidance.rigid_body.motion import fly_intervals
 from guidance.rigid_descent import RigidPlan
-from studies.campaign.provenance import digest_files, identify_run
-from studies.peers import openscvx_process
 from studies.peers.openscvx_process import (
-    PEERS_WING,
-    demand_openscvx,
     open_worker,
     openscvx_version,
-    peer_versions,
 )
-from studies.rigid_plans import RigidPlans, study_rigid_plans
 from studies.rigid_plans.commanded_flight import (
     CommandedFlight,
     fly_commanded,
-    fly_in_air,
-    least_between,
     limit_excess,
 )
 from studies.rigid_plans.openscvx_body import (
@@ -49,7 +39,6 @@ from studies.rigid_plans.peer_answers import HELD, SHIPPED, measure_flight
 from studies.rigid_plans.peer_problems import (
     EXAMPLE_BODY,
     PeerProblem,
-    Surroundings,
     published_example,
     shared_example,
     start_problem,
@@ -59,20 +48,8 @@ from studies.rigid_plans.starts import draw_start
 
 HERE = Path(sys.executable)
 OPENSCVX = openscvx_version(HERE)
-STILL = Surroundings((0.0, 0.0, 0.0), 0.0, 0.0)
-NUMBERS = EXAMPLE_BODY.numbers((0.0, 0.0, -1.0))
 LINEAR = OpenscvxSettings("linear", 31, "FOH", 2, Weights(1.0, 1.0, 1.0, 1e-3))
 with_openscvx = pytest.mark.skipif(OPENSCVX is None, reason="OpenSCvx is not installed (extra `peers`)")
-
-
-def at_height(height: float, velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> np.ndarray:
-    """An upright state of the example's body."""
-    return np.array([0.0, 0.0, height, *velocity, 1.0, *[0.0] * 6, 2.0, *[0.0] * 3])
-
-
-def fly_held(start: np.ndarray, force: Any, duration: float, around: Surroundings) -> np.ndarray:
-    thrust = np.broadcast_to(np.array(force, dtype=float), (1, 2, 3)).copy()
-    return fly_in_air(start, thrust, np.zeros((1, 2, 3)), np.array([duration]), NUMBERS, around)[-1]
 
 
 @pytest.fixture(scope="module")
@@ -82,43 +59,6 @@ def own_plan() -> tuple[PeerProblem, RigidPlan]:
     asked = peer.problem
     plan = solve_pdg_6dof(asked.state, asked.target, asked.body, gravity=asked.gravity, nodes=31)
     return peer, plan
-
-
-@settings(max_examples=10, deadline=None)
-@given(st.lists(st.floats(-0.3, 0.3), min_size=6, max_size=6), st.floats(1.5, 6.5), st.floats(0.1, 1.0))
-def test_without_air_the_motion_is_the_vehicle_s(across: list[float], up: float, duration: float) -> None:
-    start = at_height(5.0, (-1.0, 0.5, -0.7))
-    thrust = np.array([[[*across[:2], up], [*across[2:4], up]], [[*across[3:5], up], [*across[4:6], up]]])
-    torque, durations = 1e-3 * thrust[:, ::-1], np.array([duration, 0.5 * duration])
-    here = fly_in_air(start, thrust, torque, durations, NUMBERS, STILL)
-    there = fly_intervals(start, thrust, torque, durations, NUMBERS)
-    assert here[:, :14] == pytest.approx(there[:, :14], abs=1e-5)
-
-
-def test_a_fall_in_air_follows_its_closed_form() -> None:
-    """v = -V tanh(g t / V), with V^2 = m g / k: no thrust, upright."""
-    drag, duration = 0.125, 3.0
-    end = fly_held(at_height(20.0), 0.0, duration, Surroundings((0.25, 0.25, drag), 0.05, 0.0))
-    most = math.sqrt(2.0 / drag)
-    assert end[5] == pytest.approx(-most * math.tanh(duration / most), rel=1e-8)
-    assert 20.0 - end[2] == pytest.approx(most**2 * math.log(math.cosh(duration / most)), rel=1e-8)
-    assert end[13] == 2.0
-
-
-def test_air_turns_the_body_by_the_arm_of_its_own() -> None:
-    """For a short while: the moment of the force k v^2 at the arm, whatever the engine's arm is."""
-    duration = 1e-3
-    end = fly_held(
-        at_height(20.0, (2.0, 0.0, 0.0)), 0.0, duration, Surroundings((0.25, 0.25, 0.0), 0.05, 0.0)
-    )
-    assert end[11] == pytest.approx(-0.25 * 4.0 * 0.05 / 0.168 * duration, rel=1e-3)
-    assert end[10] == end[12] == 0.0
-    assert end[3] == pytest.approx(2.0 - 0.5 * 4.0 * 0.25 * duration, rel=1e-6)
-
-
-def test_a_leak_is_lost_beside_what_the_engine_burns() -> None:
-    end = fly_held(at_height(20.0), (0.0, 0.0, 3.0), 2.0, replace(STILL, leak=0.01))
-    assert end[13] == pytest.approx(2.0 - 2.0 * (3.0 / 30.0 + 0.01), rel=1e-9)
 
 
 def test_our_own_plan_is_flown_as_its_residuals_say(own_plan: tuple[PeerProblem, RigidPlan]) -> None:
@@ -152,46 +92,6 @@ def test_what_is_burnt_is_flown_and_not_what_a_plan_says(own_plan: tuple[PeerPro
     assert moved.gap == pytest.approx(3.0, abs=0.01)
     assert moved[:2] == true[:2]
     assert moved[4:] == true[4:]
-
-
-@pytest.mark.parametrize(
-    ("name", "change", "share"),
-    [
-        ("most thrust", {"max_thrust": 1.5}, 1.0),
-        ("least thrust", {"min_thrust": 4.0, "max_thrust": 5.0}, 0.25),
-    ],
-)
-def test_a_limit_that_is_left_is_told_as_a_share(name: str, change: dict, share: float) -> None:
-    peer = shared_example()
-    lander = replace(EXAMPLE_BODY.lander, **{"min_thrust": 1.0, **change})
-    peer = replace(peer, problem=replace(peer.problem, body=replace(EXAMPLE_BODY, lander=lander)))
-    thrust = np.broadcast_to(np.array([0.0, 0.0, 3.0]), (1, 2, 3)).copy()
-    states = np.tile(at_height(7.5)[:14], (2, 1))
-    flight = CommandedFlight(np.array([0.0, 0.1]), states, thrust, np.zeros((1, 2, 3)))
-    excess = limit_excess(fly_commanded(flight, peer), flight, peer)
-    assert excess[name] == pytest.approx(share)
-    assert excess["gimbal"] == excess["tank"] == excess["altitude"] == 0.0
-
-
-@settings(max_examples=50, deadline=None)
-@given(st.lists(st.floats(-5.0, 5.0), min_size=6, max_size=6))
-def test_the_least_thrust_lies_anywhere_on_an_interval(ends: list[float]) -> None:
-    """Beside the least of many points of the same line, which their spacing bounds."""
-    command = np.array(ends).reshape(1, 2, 3)
-    shares = np.linspace(0.0, 1.0, 501)[:, None]
-    fine = np.linalg.norm(command[0, 0] + shares * (command[0, 1] - command[0, 0]), axis=1).min()
-    (least,) = least_between(command)
-    assert least <= fine + 1e-12
-    assert least == pytest.approx(fine, abs=np.linalg.norm(command[0, 1] - command[0, 0]) / 1000.0 + 1e-12)
-
-
-def test_a_thrust_that_turns_linearly_dips_below_the_least_between_its_ends() -> None:
-    peer = shared_example()
-    thrust = np.array([[[1.5, 0.0, 1.0], [-1.5, 0.0, 1.0]]])  # both ends above 1.5, the middle at 1
-    states = np.tile(at_height(7.5)[:14], (2, 1))
-    flight = CommandedFlight(np.array([0.0, 0.1]), states, thrust, np.zeros((1, 2, 3)))
-    excess = limit_excess(fly_commanded(flight, peer), flight, peer)
-    assert excess["least thrust"] == pytest.approx(1.0 / 3.0)
 
 
 @pytest.mark.parametrize("change", [{"engine_lag": 0.2}, {"torque_limit": (1.0, 0.0, 0.0)}])
@@ -377,87 +277,11 @@ def test_lines_and_conclusions_are_of_what_was_planned() -> None:
     assert all(math.isnan(number) for number in (alone.share, alone.miss, alone.speed, alone.excess))
 
 
-@pytest.mark.skipif(OPENSCVX is not None, reason="OpenSCvx is installed")
-def test_the_worker_says_what_it_lacks() -> None:
-    """The real one, in an interpreter without the package."""
-    with open_worker(HERE, SERVE_BODY) as worker:
-        answer = ask_openscvx(worker, shared_example(), HELD)
-    assert answer.status == "failed: ModuleNotFoundError: No module named 'openscvx'"
-    assert answer.processor > 0.0
-
-
-def test_a_worker_that_ends_is_told() -> None:
-    with open_worker(HERE, "import sys; sys.exit('it was too much')") as worker:
-        answer = ask_openscvx(worker, shared_example(), HELD)
-    assert answer.status == "failed: the worker ended: it was too much"
-
-
-def test_an_interpreter_without_the_package_is_named_before_a_folder_is_made(tmp_path: Path) -> None:
-    out = tmp_path / "plans"
-    with pytest.raises(OSError, match="absent"):
-        study_rigid_plans(RigidPlans(openscvx_python=tmp_path / "absent", out=out))
-    if OPENSCVX is None:
-        with pytest.raises(ValueError, match="has no openscvx"):
-            study_rigid_plans(RigidPlans(openscvx_python=HERE, out=out))
-    assert not out.exists()
-
-
-def test_what_names_no_versions_is_no_interpreter(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Programmes that answer nothing, something else, and too late."""
-    monkeypatch.setattr(openscvx_process, "_PATIENCE", 0.5)
-    for name, does in (
-        ("silent", "exit 0"),
-        ("loud", "echo 1"),
-        ("words", "echo '{\"a\": 1}'"),
-        ("late", "exec sleep 9"),
-    ):
-        stranger = tmp_path / name
-        stranger.write_text(f"#!/bin/sh\n{does}\n")
-        stranger.chmod(0o755)
-        assert peer_versions(stranger) == {}
-        with pytest.raises(ValueError, match=r"openscvx_python: .* has no Python"):
-            demand_openscvx(stranger)
-
-
-def test_an_interpreter_names_its_python_and_packages() -> None:
-    found = peer_versions(HERE)
-    assert found["python"] == platform.python_version()
-    assert found["numpy"] == np.__version__
-
-
-@pytest.mark.parametrize(
-    ("asked", "words"),
-    [
-        ({"starts": 3, "peer_starts": 1}, "starts must be at least 4"),
-        ({"starts": 9, "peer_starts": 7}, "at most 6"),
-    ],
-)
-def test_no_more_starts_are_asked_of_the_peer_than_were_not_chosen_on(asked: dict, words: str) -> None:
-    with pytest.raises(ValueError, match=words):
-        RigidPlans(openscvx_python=HERE, **asked)
-    RigidPlans(starts=1)  # where it is not asked the default does not matter
-
-
 def test_a_start_is_the_same_problem_whoever_is_asked() -> None:
     asked, drawn = start_problem("paper", 5).problem, draw_start("paper", 5)
     assert np.array_equal(asked.state.as_array(), drawn.state.as_array())
     assert np.array_equal(asked.target, drawn.target)
     assert asked.body == drawn.body
-
-
-def test_a_wing_beside_changes_the_identity_of_a_run(tmp_path: Path) -> None:
-    """One byte of it does; without one the digest is that of the wing alone."""
-    wing, beside = tmp_path / "wing", tmp_path / "beside"
-    for folder in (wing, beside):
-        folder.mkdir()
-        (folder / "a.py").write_text("1")
-    alone = identify_run(wing, {})["wing"]
-    both = identify_run(wing, {}, beside=(beside,))["wing"]
-    (beside / "a.py").write_text("2")
-    changed = identify_run(wing, {}, beside=(beside,))["wing"]
-    assert alone == digest_files(wing)
-    assert len({alone, both, changed}) == 3
-    assert (PEERS_WING / "openscvx_process.py").is_file()
 
 
 @with_openscvx
