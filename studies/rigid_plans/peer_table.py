@@ -46,7 +46,7 @@ class FlownPlan(NamedTuple):
     limit: str
 
 
-NO_FLIGHT = FlownPlan(*[math.nan] * 8, "")
+NO_FLIGHT = FlownPlan(math.nan, math.nan, math.nan, math.nan, math.nan, math.nan, math.nan, math.nan, "")
 """Where nothing was planned."""
 
 
@@ -173,10 +173,9 @@ def sum_up_peers(answers: Sequence[PeerAnswer]) -> list[PeerRow]:
                 mine[0].first_seconds,
                 float(np.median([a.solves for a in mine])),
                 float(np.median([a.share for a in flown])) if flown else math.nan,
-                *(
-                    max((getattr(a, name) for a in flown), default=math.nan)
-                    for name in ("miss", "speed", "fastest")
-                ),
+                max((a.miss for a in flown), default=math.nan),
+                max((a.speed for a in flown), default=math.nan),
+                max((a.fastest for a in flown), default=math.nan),
                 math.nan if worst is None else worst.excess,
                 "" if worst is None else worst.limit,
             )
