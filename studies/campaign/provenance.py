@@ -106,15 +106,18 @@ def identify_software(paths: tuple[str, ...] = ()) -> dict[str, Any]:
     }
 
 
-def identify_run(wing: Path, decided: dict[str, Any], paths: tuple[str, ...] = ()) -> dict[str, Any]:
+def identify_run(
+    wing: Path, decided: dict[str, Any], paths: tuple[str, ...] = (), beside: tuple[Path, ...] = ()
+) -> dict[str, Any]:
     """All that decides the rows of a run that is no single study: options, versions, digests of the sources.
 
     Args:
         wing: folder of the study's own code, which works out the rows.
         decided: the options that decide a row, whichever rows are asked for.
         paths: paths `package.module:Name` of policies that are not registered.
+        beside: folders of other wings of studies that the rows depend on.
     """
-    return {"options": decided, **identify_software(paths), "wing": digest_files(wing)}
+    return {"options": decided, **identify_software(paths), "wing": digest_files(wing, *beside)}
 
 
 def digest_sources(paths: tuple[str, ...]) -> dict[str, str]:

@@ -5,6 +5,8 @@ It runs in an interpreter that has the package, as it brings JAX and compiles fo
 
 from __future__ import annotations
 
+import json
+import re
 import subprocess
 import tempfile
 from collections.abc import Iterator
@@ -13,6 +15,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
+PEERS_WING = Path(__file__).parent
+"""What the rows of every study that asks a peer depend on (`identify_run`)."""
 OPENSCVX_PACKAGE = "openscvx"
 OPENSCVX_METHOD = "OpenSCvx"
 FIRST_ORDER_HOLD = (
@@ -20,7 +24,39 @@ FIRST_ORDER_HOLD = (
     "what it integrates is not the thrust that it gives at the nodes."
 )
 """Why its plans miss when they are flown."""
-_VERSION = f"from importlib.metadata import version; print(version({OPENSCVX_PACKAGE!r}))"
+_PACKAGES = (OPENSCVX_PACKAGE, "jax", "jaxlib", "diffrax", "cvxpy", "qoco", "numpy")
+_VERSIONS = f"""
+import json, platform
+from importlib import metadata
+found = {{"python": platform.python_version()}}
+for name in {_PACKAGES!r}:
+    try:
+        found[name] = metadata.version(name)
+    except metadata.PackageNotFoundError:
+        pass
+print(json.dumps(found))
+"""
+_NUMBER = re.compile(r"\d+(\.\w+)+")
+_PATIENCE = 60.0  # [s] for an interpreter to name its versions
+
+
+def peer_versions(python: Path) -> dict[str, str]:
+    """Package -> version of what decides the peer's answers in an interpreter, and that of Python itself.
+
+    Returns:
+        Nothing if it does not answer as an interpreter does, or later than after a minute.
+
+    Raises:
+        OSError: there is no such interpreter.
+    """
+    try:
+        asked = subprocess.run(
+            [str(python), "-c", _VERSIONS], capture_output=True, text=True, timeout=_PATIENCE
+        )
+        told = json.loads(asked.stdout)
+        return {str(name): version for name, version in told.items() if _NUMBER.match(version)}
+    except (subprocess.TimeoutExpired, ValueError, TypeError, AttributeError):
+        return {}
 
 
 def openscvx_version(python: Path) -> str | None:
@@ -29,19 +65,20 @@ def openscvx_version(python: Path) -> str | None:
     Raises:
         OSError: there is no such interpreter.
     """
-    asked = subprocess.run([str(python), "-c", _VERSION], capture_output=True, text=True, timeout=60)
-    return asked.stdout.strip() if asked.returncode == 0 else None
+    return peer_versions(python).get(OPENSCVX_PACKAGE)
 
 
-def demand_openscvx(python: Path) -> str:
-    """Version of the package that the interpreter which the user names has.
+def demand_openscvx(python: Path) -> dict[str, str]:
+    """As `peer_versions`, of the interpreter which the user names.
 
     Raises:
-        ValueError: it has none.
+        ValueError: it has no such package, or names no versions.
         OSError: there is no such interpreter.
     """
-    found = openscvx_version(python)
-    if found is None:
+    found = peer_versions(python)
+    if not found:
+        raise ValueError(f"openscvx_python: {python} has no Python that names its packages within a minute")
+    if OPENSCVX_PACKAGE not in found:
         raise ValueError(f"openscvx_python: {python} has no {OPENSCVX_PACKAGE}")
     return found
 

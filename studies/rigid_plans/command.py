@@ -23,9 +23,9 @@ from studies.campaign.journal import open_journal
 from studies.campaign.provenance import describe_run, identify_run, write_provenance
 from studies.campaign.run_options import FolderOptions
 from studies.columns import console_table, write_csv, write_markdown
-from studies.peers.openscvx_process import demand_openscvx, open_worker
+from studies.peers.openscvx_process import PEERS_WING, demand_openscvx, open_worker
 from studies.rigid_plans.openscvx_body import SERVE_BODY
-from studies.rigid_plans.peer_answers import ask_all
+from studies.rigid_plans.peer_answers import CHOSEN_ON, ask_all
 from studies.rigid_plans.peer_table import (
     ANSWER_COLUMNS,
     PEER_COLUMNS,
@@ -37,6 +37,8 @@ from studies.rigid_plans.starts import (
     COLUMNS,
     METHODS,
     PLAN_COLUMNS,
+    SPLIT,
+    STUDY_SEED,
     MethodRow,
     PlannedStart,
     conclude,
@@ -46,7 +48,7 @@ from studies.rigid_plans.starts import (
 
 _WING = Path(__file__).parent
 _PRODUCTS = ("plans.csv", "table.csv", "table.md", "provenance.json", "conclusions.txt")
-_PEER_PRODUCTS = ("answers.csv", "table.csv", "table.md", "conclusions.txt")
+_PEER_PRODUCTS = ("answers.csv", "table.csv", "table.md", "provenance.json", "conclusions.txt")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,7 +60,8 @@ class RigidPlans(FolderOptions):
         preset: whose start conditions they are drawn from.
         nodes: of each plan.
         openscvx_python: interpreter of an environment that has OpenSCvx; without one it is not asked.
-        peer_starts: how many of the starts OpenSCvx is asked.
+        peer_starts: how many of the starts OpenSCvx is asked: from the fourth on, as its weights were chosen
+            on the first three.
     """
 
     starts: int = 100
@@ -72,6 +75,9 @@ class RigidPlans(FolderOptions):
         """Check every option."""
         finite_number("starts", self.starts, at_least=1)
         finite_number("peer_starts", self.peer_starts, at_least=1)
+        if self.openscvx_python is not None:
+            finite_number("starts", self.starts, at_least=CHOSEN_ON + 1)
+            finite_number("peer_starts", self.peer_starts, at_most=self.starts - CHOSEN_ON)
         finite_number("nodes", self.nodes, at_least=FEWEST_NODES)
         find_preset(self.preset)
 
@@ -85,7 +91,7 @@ def study_rigid_plans(options: RigidPlans) -> list[MethodRow]:
         OSError: the folder cannot be written, or there is no such interpreter.
     """
     python = options.openscvx_python
-    openscvx = None if python is None else demand_openscvx(python)
+    versions = {} if python is None else demand_openscvx(python)
     out, console = open_folder(options.out), Console(width=max(Console().width, 130))
     decided = {"preset": options.preset, "nodes": options.nodes}
     identity = identify_run(_WING, decided)
@@ -98,7 +104,7 @@ def study_rigid_plans(options: RigidPlans) -> list[MethodRow]:
         (out / "conclusions.txt").write_text("\n".join(words) + "\n")
         write_provenance(out / "provenance.json", {**describe_run(options), "work": journal.describe()})
     if python is not None:
-        answers = ask_peers(options, python, openscvx)
+        answers = ask_peers(options, python, versions)
         wide = Console(width=max(Console().width, 190))
         wide.print(console_table(PEER_COLUMNS, sum_up_peers(answers), "beside OpenSCvx"))
         words += conclude_peers(answers)
@@ -110,16 +116,21 @@ def study_rigid_plans(options: RigidPlans) -> list[MethodRow]:
     return rows
 
 
-def ask_peers(options: RigidPlans, python: Path, version: str | None) -> list[PeerAnswer]:
-    """Ask OpenSCvx and solve_pdg_6dof the same problems; write their tables under `peers`.
+def ask_peers(options: RigidPlans, python: Path, versions: dict[str, str]) -> list[PeerAnswer]:
+    """Ask OpenSCvx and solve_pdg_6dof the same problems; write their tables and provenance under `peers`.
+
+    Args:
+        options: of the study.
+        python: interpreter that has OpenSCvx.
+        versions: of its packages.
 
     Raises:
         ValueError: the folder holds another study.
         OSError: the folder cannot be written.
     """
     out = options.out / "peers"
-    decided = {"preset": options.preset, "nodes": options.nodes, "openscvx": version}
-    identity = identify_run(_WING, decided)
+    decided = {"preset": options.preset, "nodes": options.nodes, "peers": versions}
+    identity = identify_run(_WING, decided, beside=(PEERS_WING,))
     with (
         open_journal(out, PeerAnswer, _PEER_PRODUCTS, identity, options.existing) as journal,
         open_worker(python, SERVE_BODY) as worker,
@@ -130,6 +141,9 @@ def ask_peers(options: RigidPlans, python: Path, version: str | None) -> list[Pe
         write_csv(out / "table.csv", PEER_COLUMNS, rows)
         write_markdown(out / "table.md", PEER_COLUMNS, rows)
         (out / "conclusions.txt").write_text("\n".join(conclude_peers(answers)) + "\n")
+        drawn = {"study_seed": STUDY_SEED, "split": SPLIT, "peers": versions}
+        told = {**describe_run(options), **drawn, "work": journal.describe()}
+        write_provenance(out / "provenance.json", told)
     return answers
 
 

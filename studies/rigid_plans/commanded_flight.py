@@ -108,6 +108,17 @@ def _rates_in_air(
     return rates
 
 
+def least_between(commands: Array) -> Array:
+    """Least size on each interval, shape (K,), of what is linear between its ends, shape (K, 2, 3).
+
+    All other limits of commands are greatest at an end, as sizes and cones are convex.
+    """
+    first, along = commands[:, 0], commands[:, 1] - commands[:, 0]
+    length = np.sum(along**2, axis=1)
+    nearest = -np.sum(first * along, axis=1) / np.where(length > 0.0, length, 1.0)
+    return np.linalg.norm(first + np.clip(nearest, 0.0, 1.0)[:, None] * along, axis=1)
+
+
 def limit_excess(flown: Array, flight: CommandedFlight, peer: PeerProblem) -> dict[str, float]:
     """By which share each limit is left, of what the problem states, whatever `looseness` the planner had.
 
@@ -135,7 +146,7 @@ def limit_excess(flown: Array, flight: CommandedFlight, peer: PeerProblem) -> di
         "tank": (lander.dry_mass - flown[-1:, 13]) / (problem.state.mass - lander.dry_mass),
     }
     if lander.min_thrust > 0.0:
-        shares["least thrust"] = 1.0 - size / lander.min_thrust
+        shares["least thrust"] = 1.0 - least_between(flight.thrust) / lander.min_thrust
     if max(body.torque_limit) > 0.0:
         shares["torque"] = np.abs(flight.torque).reshape(-1, 3) / np.array(body.torque_limit) - 1.0
     if problem.glide_slope is not None:

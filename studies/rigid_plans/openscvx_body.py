@@ -15,13 +15,16 @@ from typing import Literal
 import numpy as np
 
 from guidance.arrays import Array
+from guidance.rigid_body.quaternion import tilt_angle
 from studies.peers.openscvx_process import WorkerProcess, serving_code
 from studies.rigid_plans.commanded_flight import CommandedFlight
 from studies.rigid_plans.peer_problems import PeerProblem
 
 SERVE_BODY = serving_code(Path(__file__).with_name("openscvx_body_worker.py"))
 """Python that answers cases in the other interpreter."""
-_NEAR = 1e-4  # of the boxes: a flight that starts further off answers another case
+NEAR = 1e-5
+"""Share of the boxes of positions and velocities, of a radian of lean and of the rate limit by which a flight
+may start or end elsewhere than it was asked; further off it answers another case."""
 _WIDTHS = {
     "time": (),
     "mass": (),
@@ -92,8 +95,14 @@ class OpenscvxAnswer:
 
 
 def write_body_case(peer: PeerProblem, settings: OpenscvxSettings) -> str:
-    """A problem as the worker reads it: a line of JSON, in the peer's units, positions from the target."""
+    """A problem as the worker reads it: a line of JSON, in the peer's units, positions from the target.
+
+    Raises:
+        ValueError: the body has a gimbal beside torque or an engine lag, which the worker does not state.
+    """
     problem, body, state = peer.problem, peer.problem.body, peer.problem.state
+    if body.gimbal_limit > 0.0 and (body.engine_lag > 0.0 or max(body.torque_limit) > 0.0):
+        raise ValueError("body: OpenSCvx is asked a gimbal only without torque_limit and engine_lag")
     lander, around = body.lander, peer.surroundings
     length, time, mass = peer.length, peer.duration, peer.mass
     speed, acceleration = length / time, length / time**2
@@ -159,10 +168,31 @@ def read_body_answer(line: str, peer: PeerProblem, settings: OpenscvxSettings) -
     if np.diff(arrays["time"]).min() <= 0.0:
         return OpenscvxAnswer("failed: time does not grow", processor, iterations, None)
     flight = _flight(arrays, peer, settings)
-    gap = flight.states[0, :6] - np.concatenate([peer.problem.state.position, peer.problem.state.velocity])
-    if np.abs(gap[:3]).max() > _NEAR * peer.farthest or np.abs(gap[3:]).max() > _NEAR * peer.fastest:
-        return OpenscvxAnswer("failed: the flight starts elsewhere", processor, iterations, None)
+    misplaced = _misplaced(flight.states, peer)
+    if misplaced:
+        return OpenscvxAnswer(f"failed: the flight {misplaced}", processor, iterations, None)
     return OpenscvxAnswer("converged", processor, iterations, flight)
+
+
+def _misplaced(states: Array, peer: PeerProblem) -> str:
+    """Where planned states, shape (K + 1, 14), do not begin or end as asked; empty if they do."""
+    problem = peer.problem
+    asked = problem.state.as_array()[:14]
+    landed = np.concatenate([problem.target, problem.target_velocity, [1.0], np.zeros(6), states[-1, 13:]])
+    for words, state, wanted in (("starts", states[0], asked), ("ends", states[-1], landed)):
+        gap = np.abs(state - wanted)
+        lean = abs(tilt_angle(state[6:10]) - tilt_angle(wanted[6:10]))
+        shares = {
+            "position": gap[:3].max() / peer.farthest,
+            "velocity": gap[3:6].max() / peer.fastest,
+            "lean": 0.0 if words == "starts" and problem.free_attitude else lean,
+            "rates": gap[10:13].max() / problem.body.rate_limit,
+            "mass": gap[13] / problem.state.mass,
+        }
+        for name, share in shares.items():
+            if share > NEAR:
+                return f"{words} elsewhere: {name} {share:.1e} off"
+    return ""
 
 
 def _flight(arrays: dict[str, Array], peer: PeerProblem, settings: OpenscvxSettings) -> CommandedFlight:

@@ -110,8 +110,8 @@ class BodyProgramme:
             lever = case["pressure_arm"]
             moment = [moment[0] - lever * air[1], moment[1] + lever * air[0], moment[2]]
             total = force + air
-        inertia = case["inertia"]
-        scale = mass / case["inertia_mass"] if case["inertia_exponent"] == 1.0 else 1.0
+        inertia, exponent = case["inertia"], case["inertia_exponent"]
+        scale = 1.0 if exponent == 0.0 else (mass / case["inertia_mass"]) ** exponent
         crossed = [(b * c, 1, 2), (c * a, 2, 0), (a * b, 0, 1)]
         return {
             **motion,

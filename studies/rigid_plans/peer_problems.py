@@ -15,9 +15,9 @@ import numpy as np
 
 from guidance import Lander
 from guidance.constants import STANDARD_GRAVITY
-from guidance.rigid_body import DEFAULT_BODY, RigidBody, RigidState
+from guidance.rigid_body import RigidBody, RigidState
 from guidance.rigid_descent import RigidLandingProblem
-from hda.task.scenario import sample_scenario
+from studies.rigid_plans.starts import draw_start
 
 START_SECONDS = 40.0
 """[s] first guess of the time of flight of a start of ours."""
@@ -134,14 +134,8 @@ def shared_example() -> PeerProblem:
 
 
 def start_problem(preset: str, start: int) -> PeerProblem:
-    """The start of an episode on the tuning tiles to its first target, as `starts.plan_start` has it."""
-    scenario = sample_scenario(preset, 0, start, "tuning")
-    problem = RigidLandingProblem(
-        RigidState.parse(scenario.initial_state),
-        np.array(scenario.nominal_target),
-        replace(DEFAULT_BODY, lander=scenario.preset.lander),
-        np.array(scenario.preset.gravity),
-    )
+    """The start that `starts.plan_start` plans, and how the peer counts in it."""
+    problem = draw_start(preset, start)
     return PeerProblem(
         f"start of {preset}",
         problem,

@@ -24,11 +24,13 @@ class FlownPlan(NamedTuple):
     """A plan that was flown; nan without a flight.
 
     Attributes:
-        burnt: propellant.
+        burnt: propellant, flown.
         share: the same, of the mass at the start.
         time_of_flight: planned.
-        miss: flown end from the planned one.
-        speed: flown velocity at the end from the planned one.
+        gap: flown end from the planned one.
+        miss: flown end from the target.
+        speed: flown velocity at the end from the asked one.
+        fastest: greatest speed, flown.
         excess: greatest share by which a limit is left, flown.
         limit: which one; empty where none is left by more than `LEAST_EXCESS`.
     """
@@ -36,13 +38,15 @@ class FlownPlan(NamedTuple):
     burnt: float
     share: float
     time_of_flight: float
+    gap: float
     miss: float
     speed: float
+    fastest: float
     excess: float
     limit: str
 
 
-NO_FLIGHT = FlownPlan(math.nan, math.nan, math.nan, math.nan, math.nan, math.nan, "")
+NO_FLIGHT = FlownPlan(math.nan, math.nan, math.nan, math.nan, math.nan, math.nan, math.nan, math.nan, "")
 """Where nothing was planned."""
 
 
@@ -58,7 +62,7 @@ class PeerAnswer:
         seconds: [s] processor time.
         first_seconds: [s] that of the first question, which compiles.
         solves: programmes.
-        burnt, share, time_of_flight, miss, speed, excess, limit: as `FlownPlan` has them.
+        burnt, share, time_of_flight, gap, miss, speed, fastest, excess, limit: as `FlownPlan` has them.
     """
 
     problem: str
@@ -71,8 +75,10 @@ class PeerAnswer:
     burnt: float
     share: float
     time_of_flight: float
+    gap: float
     miss: float
     speed: float
+    fastest: float
     excess: float
     limit: str
 
@@ -92,6 +98,7 @@ class PeerRow:
         share: propellant over the mass at the start.
         miss: the greatest.
         speed: the greatest.
+        fastest: the greatest.
         excess: the greatest.
         limit: which one.
     """
@@ -106,6 +113,7 @@ class PeerRow:
     share: float
     miss: float
     speed: float
+    fastest: float
     excess: float
     limit: str
 
@@ -120,8 +128,10 @@ ANSWER_COLUMNS: tuple[Column[PeerAnswer], ...] = (
     Column("solves", "solves", lambda a: a.solves),
     Column("propellant", "propellant", lambda a: a.burnt),
     Column("time_of_flight", "time of flight", lambda a: a.time_of_flight),
+    Column("gap", "from the plan", lambda a: a.gap),
     Column("miss", "miss", lambda a: a.miss),
-    Column("speed", "speed", lambda a: a.speed),
+    Column("landing_speed", "speed", lambda a: a.speed),
+    Column("fastest", "fastest", lambda a: a.fastest),
     Column("excess_percent", "excess", lambda a: 100.0 * a.excess),
     Column("limit", "limit", lambda a: a.limit, words=True),
 )
@@ -137,8 +147,9 @@ PEER_COLUMNS: tuple[Column[PeerRow], ...] = (
     Column("first_cpu_s", "first", lambda r: r.first_seconds, digits=1, unit="s"),
     Column("solves_p50", "solves", lambda r: r.solves, digits=0),
     Column("propellant_percent_p50", "propellant", lambda r: 100.0 * r.share, digits=3, unit="%"),
-    Column("miss_max", "greatest miss", lambda r: r.miss, digits=4),
-    Column("speed_max", "greatest speed", lambda r: r.speed, digits=4),
+    Column("miss_max", "miss", lambda r: r.miss, digits=4),
+    Column("landing_speed_max", "speed error", lambda r: r.speed, digits=4),
+    Column("fastest_max", "fastest", lambda r: r.fastest, digits=2),
     Column("excess_percent_max", "limit left by", lambda r: 100.0 * r.excess, digits=1, unit="%"),
     Column("limit", "which", lambda r: r.limit, words=True),
 )
@@ -164,6 +175,7 @@ def sum_up_peers(answers: Sequence[PeerAnswer]) -> list[PeerRow]:
                 float(np.median([a.share for a in flown])) if flown else math.nan,
                 max((a.miss for a in flown), default=math.nan),
                 max((a.speed for a in flown), default=math.nan),
+                max((a.fastest for a in flown), default=math.nan),
                 math.nan if worst is None else worst.excess,
                 "" if worst is None else worst.limit,
             )
@@ -172,21 +184,30 @@ def sum_up_peers(answers: Sequence[PeerAnswer]) -> list[PeerRow]:
 
 
 def conclude_peers(answers: Sequence[PeerAnswer]) -> list[str]:
-    """How answers without a flight ended; on problems that both plan, what more the peer burns and takes."""
+    """How answers without a flight ended; what more the peer burns and takes than each method of ours.
+
+    Flown propellant is compared on the problems that both plan, and our methods, one a mesh, apart.
+    """
     words = [f"{a.method}, {a.problem}: {a.status}." for a in answers if math.isnan(a.burnt)]
     for row in sum_up_peers(answers):
-        if not row.method.startswith(OPENSCVX_METHOD):
-            continue
-        planned = [a for a in answers if a.problem == row.problem and not math.isnan(a.burnt)]
-        own = {a.start: a for a in planned if a.method.startswith(OWN_METHOD)}
-        both = [(a, own[a.start]) for a in planned if a.method == row.method and a.start in own]
-        if both:
-            more = [theirs.burnt - ours.burnt for theirs, ours in both]
-            longer = np.median([theirs.seconds / ours.seconds for theirs, ours in both])
-            words.append(
-                f"{row.problem}: {row.method} burns {min(more):+.4f} to {max(more):+.4f} more than "
-                f"{OWN_METHOD} on {len(both)} that both plan, {float(np.median(more)):+.4f} in the median, "
-                f"and takes {longer:.1f} times as long."
-            )
+        if row.method.startswith(OPENSCVX_METHOD):
+            planned = [a for a in answers if a.problem == row.problem and not math.isnan(a.burnt)]
+            theirs = {a.start: a for a in planned if a.method == row.method}
+            for method in dict.fromkeys(a.method for a in planned if a.method.startswith(OWN_METHOD)):
+                ours = {a.start: a for a in planned if a.method == method}
+                words += _compare(row, method, [(theirs[s], ours[s]) for s in theirs if s in ours])
     words.append(f"Where {OPENSCVX_METHOD}'s controls are not held they are linear. {FIRST_ORDER_HOLD}")
     return words
+
+
+def _compare(row: PeerRow, method: str, both: Sequence[tuple[PeerAnswer, PeerAnswer]]) -> list[str]:
+    """A sentence on the peer's answers of a row beside those of a method of ours; none without any."""
+    if not both:
+        return []
+    more = [theirs.burnt - ours.burnt for theirs, ours in both]
+    longer = np.median([theirs.seconds / ours.seconds for theirs, ours in both])
+    return [
+        f"{row.problem}: {row.method} burns {min(more):+.4f} to {max(more):+.4f} more than {method} on "
+        f"{len(both)} that both plan, {float(np.median(more)):+.4f} in the median, and takes {longer:.1f} "
+        "times as long."
+    ]

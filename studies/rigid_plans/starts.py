@@ -18,13 +18,15 @@ import numpy as np
 from rich.progress import track
 
 from guidance import solve_pdg_6dof
-from guidance.rigid_body import DEFAULT_BODY
-from guidance.rigid_descent import RigidPlan
+from guidance.rigid_body import DEFAULT_BODY, RigidState
+from guidance.rigid_descent import RigidLandingProblem, RigidPlan
 from guidance.successive.solve import RigidPlanningMethod
 from hda.task.scenario import sample_scenario
 from studies.campaign.journal import Journal
 from studies.columns import Column
 
+STUDY_SEED, SPLIT = 0, "tuning"
+"""Of the episodes whose starts are planned."""
 METHODS: tuple[RigidPlanningMethod, ...] = get_args(RigidPlanningMethod)
 
 
@@ -109,15 +111,26 @@ COLUMNS: tuple[Column[MethodRow], ...] = (
 """The methods: table.csv, table.md and the console read this list."""
 
 
+def draw_start(preset: str, start: int) -> RigidLandingProblem:
+    """The start of a preset's episode on the tuning tiles, to its first target, upright and at rest."""
+    scenario = sample_scenario(preset, STUDY_SEED, start, SPLIT)
+    return RigidLandingProblem(
+        RigidState.parse(scenario.initial_state),
+        np.array(scenario.nominal_target),
+        replace(DEFAULT_BODY, lander=scenario.preset.lander),
+        np.array(scenario.preset.gravity),
+    )
+
+
 def plan_start(start: int, method: RigidPlanningMethod, preset: str, nodes: int) -> PlannedStart:
-    """Plan the start of a preset's episode on the tuning tiles to its first target, and fly the plan."""
-    scenario = sample_scenario(preset, 0, start, "tuning")
+    """Plan a start, and fly the plan."""
+    asked = draw_start(preset, start)
     begun = process_time()
     plan = solve_pdg_6dof(
-        scenario.initial_state,
-        scenario.nominal_target,
-        replace(DEFAULT_BODY, lander=scenario.preset.lander),
-        gravity=scenario.preset.gravity,
+        asked.state,
+        asked.target,
+        asked.body,
+        gravity=asked.gravity,
         nodes=nodes,
         method=method,
         throw=False,

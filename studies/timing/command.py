@@ -27,7 +27,12 @@ from studies.campaign.journal import open_journal
 from studies.campaign.provenance import describe_run, identify_run, write_provenance
 from studies.campaign.run_options import FolderOptions
 from studies.columns import console_table, write_csv, write_markdown
-from studies.peers.openscvx_process import OPENSCVX_PACKAGE, demand_openscvx, openscvx_version
+from studies.peers.openscvx_process import (
+    OPENSCVX_PACKAGE,
+    PEERS_WING,
+    demand_openscvx,
+    openscvx_version,
+)
 from studies.timing.answer_times import AnswerBatch, AnswerTime, measure_answers, time_new_processes
 from studies.timing.conclusions import conclude
 from studies.timing.gfold_peer import PEER_METHOD, gfold_present
@@ -84,7 +89,9 @@ def find_peers(options: Timing) -> dict[str, str | None]:
         OSError: there is no such interpreter.
     """
     named = options.openscvx_python
-    openscvx = openscvx_version(Path(sys.executable)) if named is None else demand_openscvx(named)
+    openscvx = (
+        openscvx_version(Path(sys.executable)) if named is None else demand_openscvx(named)[OPENSCVX_PACKAGE]
+    )
     return {
         PEER_METHOD: version(PEER_METHOD) if gfold_present() else None,
         QOCO_PACKAGE: version(QOCO_PACKAGE) if qoco_present() else None,
@@ -104,7 +111,7 @@ def identify_timing(options: Timing, peers: dict[str, str | None]) -> dict[str, 
         "peers": peers,
         "processor": name_processor(),
     }
-    return identify_run(_WING, decided)
+    return identify_run(_WING, decided, beside=(PEERS_WING,))
 
 
 def list_cases(options: Timing) -> list[Case]:
