@@ -47,7 +47,7 @@ RESULTS: dict[str, Result] = {
     "partial": Result(
         "memory.md",
         "studies.compare --preset partial --policies single-divert nearest-safe oracle hazard-aware"
-        " hazard-aware+zem-zev td3 td3-partial td3-lstm-partial td3-lstm-plus-partial",
+        " hazard-aware+zem-zev td3 td3-partial td3-lstm-partial td3-lstm-plus-partial td3-belief-partial",
     ),
     "robustness-partial": Result(
         "memory.md",
