@@ -102,7 +102,8 @@ def test_the_least_thrust_lies_anywhere_on_an_interval(ends: list[float]) -> Non
     fine = np.linalg.norm(command[0, 0] + shares * (command[0, 1] - command[0, 0]), axis=1).min()
     (least,) = least_between(command)
     assert least <= fine + 1e-12
-    assert least == pytest.approx(fine, abs=np.linalg.norm(command[0, 1] - command[0, 0]) / 1000.0 + 1e-12)
+    spacing = float(np.linalg.norm(command[0, 1] - command[0, 0])) / 500.0
+    assert least == pytest.approx(fine, abs=0.5 * spacing + 1e-12)
 
 
 def test_a_thrust_that_turns_linearly_dips_below_the_least_between_its_ends() -> None:

@@ -124,7 +124,7 @@ def test_islands_are_counted_by_their_area_and_what_is_kept_of_them(planned: Epi
     assert counts[large] == SeenIslands(len(HEIGHTS), large, 1, 1)
     assert counts[small] == SeenIslands(len(HEIGHTS), small, 1, 0)
     (near,) = measure_near(seen, kept[None])
-    assert near == NearSight(pytest.approx(6.0 * pixel), pytest.approx(pixel))
+    assert (near.read, near.encoded) == pytest.approx((6.0 * pixel, pixel))
     inside = replace(first, safety_map=np.ones_like(drawn))
     assert count_islands(replace(planned, observations=(inside,)), drawn[None]) == []
     every = count_islands(planned, maps_of(planned))
