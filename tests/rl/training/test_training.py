@@ -125,6 +125,7 @@ def test_a_run_resumes_on_another_device_and_says_so(tmp_path, capsys):
     run_training(tmp_path, PAPER, SMALL["td3"], plan(70), resume=True)
     assert "goes on on" not in capsys.readouterr().out
     path = newest_checkpoint(tmp_path)
+    assert path is not None
     kept = load_artefact(path, "checkpoint")
     save_artefact(path, "checkpoint", kept.tensors, {**kept.card, "device": "cuda"})
     run_training(tmp_path, PAPER, SMALL["td3"], plan(80), resume=True)
@@ -139,10 +140,12 @@ def test_a_gpu_that_resumes_a_run_of_the_processor_draws_by_its_seed(tmp_path, m
     algorithm = make_algorithm(SMALL["td3"], env, 3)
     seeds = []
     monkeypatch.setattr(torch.cuda, "manual_seed", seeds.append)
-    restore_checkpoint(newest_checkpoint(tmp_path), algorithm, env)
+    checkpoint = newest_checkpoint(tmp_path)
+    assert checkpoint is not None
+    restore_checkpoint(checkpoint, algorithm, env)
     assert seeds == []
     algorithm.device = torch.device("cuda")
-    restore_checkpoint(newest_checkpoint(tmp_path), algorithm, env)
+    restore_checkpoint(checkpoint, algorithm, env)
     assert seeds == [3]
 
 
