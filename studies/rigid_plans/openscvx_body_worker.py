@@ -24,7 +24,8 @@ class BodyProgramme:
 
     def __init__(self, case: dict[str, Any]) -> None:
         """Compile it for a case and all that differ from it in their start alone."""
-        ox, jax, diffrax = (importlib.import_module(name) for name in ("openscvx", "jax", "diffrax"))
+        ox = importlib.import_module("openscvx")
+        jax, diffrax = importlib.import_module("jax"), importlib.import_module("diffrax")
         jax.config.update("jax_enable_x64", True)  # before the steps below are rounded to single precision
         self._ox, self._nodes = ox, case["nodes"]
         self._declare(case)

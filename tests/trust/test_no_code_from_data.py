@@ -48,6 +48,7 @@ ALLOWED: dict[tuple[str, str], str] = {
     ("hda/flight/film.py", "importlib.import_module"): "the agents, by a fixed name, as an entry point would",
     ("studies/timing/gfold_peer.py", "importlib.import_module"): "an optional peer, by a fixed name",
     ("studies/timing/openscvx_worker.py", "importlib.import_module"): "an optional peer, by a fixed name",
+    ("studies/rigid_plans/openscvx_body_worker.py", "importlib.import_module"): "that peer for bodies",
     ("studies/timing/qoco_peer.py", "importlib.import_module"): "an optional peer, by a fixed name",
 }  # fmt: skip
 

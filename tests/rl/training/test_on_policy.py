@@ -193,6 +193,7 @@ def test_the_page_says_what_each_recipe_has():
         "decisions of each between updates": [str(one.horizon) for one in recipes.values()],
         "decisions of a gradient step": [str(one.batch_size) for one in recipes.values()],
         "deviation of the draws at the start": [f"$e^{one.log_deviation:g}$" for one in recipes.values()],
+        "$\\lambda$ of the advantages": [f"{one.trace:g}" for one in recipes.values()],
     }
     assert {
         name: [cell.replace("{", "").replace("}", "") for cell in cells] for name, *cells in said

@@ -23,7 +23,13 @@ from rl.training.run import make_environment, run_training
 from rl.training.run_folder import TrainingPlan
 from tests.equality import same
 
-FEW: dict[str, Any] = {"hidden": (8, 8), "batch_size": 8, "random_steps": 8, "replay_size": 60}
+FEW: dict[str, Any] = {
+    "hidden": (8, 8),
+    "batch_size": 8,
+    "random_steps": 8,
+    "replay_size": 60,
+    "update_every": 1,
+}
 TINY: dict[str, Any] = {"environments": 2, "horizon": 6, "batch_size": 6, "epochs": 1}
 SMALL: dict[str, AgentSettings] = {
     **{name: replace(RECIPES[name], **FEW) for name in ("td3", "td3-belief", "td3-convex")},
