@@ -6,7 +6,6 @@ moments (`studies.statistics.moments`). Rows must come in the order of their epi
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
@@ -17,7 +16,7 @@ from hda.flight.episode_row import MEASURES, RATIOS, EpisodeRow
 from studies.columns import Column, Output
 from studies.statistics.moments import TileMoments, collect_moments, mean_intervals
 from studies.statistics.paired import paired_ratio_interval
-from studies.statistics.ratios import Interval, clustered_count_interval, wilson_interval
+from studies.statistics.ratios import NO_INTERVAL, Interval, clustered_count_interval, wilson_interval
 from studies.statistics.reliability import exact_lower_bound
 
 AT_LEAST_CONFIDENCE = 0.95
@@ -157,7 +156,7 @@ def propellant_rise(
     """
     pairs = [(one, row) for one, row in zip(reference, rows, strict=True) if one.success and row.success]
     if not pairs:
-        return Interval(math.nan, math.nan, math.nan)
+        return NO_INTERVAL
     more = [row.propellant_percent - one.propellant_percent for one, row in pairs]
     return mean_intervals(collect_moments(more, [row.tile for _, row in pairs]), 0, confidence)[1]
 

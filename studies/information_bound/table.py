@@ -18,11 +18,10 @@ from hda.registry import policy_entry
 from studies.columns import Column
 from studies.information_bound.restrictions import FAILURE, FloorRow
 from studies.statistics.moments import collect_moments, mean_intervals
-from studies.statistics.ratios import Interval
+from studies.statistics.ratios import NO_INTERVAL, Interval
 
 _TOLD = 1000  # to one
 _KINDS = _BOUND, _FLOWN = "bound", "flown"
-_NOTHING = Interval(math.nan, math.nan, math.nan)
 
 
 @dataclass(frozen=True)
@@ -71,7 +70,7 @@ def list_steps(
     def tiled(values: Array) -> Interval:
         return mean_intervals(collect_moments(values, tiles), 0)[1]
 
-    rises = [_NOTHING, *(tiled(after - before) for before, after in pairwise(losses))]
+    rises = [NO_INTERVAL, *(tiled(after - before) for before, after in pairwise(losses))]
     return [
         StepRow(name, proved, tiled(loss), rise, tiled(losses[-1] - loss), failures)
         for (name, proved, failures), loss, rise in zip(found, losses, rises, strict=True)

@@ -6,7 +6,6 @@ the lander knows and how it flies.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -31,9 +30,7 @@ from studies.campaign.score import (
 from studies.columns import Column, Output
 from studies.statistics.moments import tiled_mean
 from studies.statistics.paired import decide_leads, paired_ratio_interval
-from studies.statistics.ratios import Interval
-
-_NOTHING = Interval(math.nan, math.nan, math.nan)
+from studies.statistics.ratios import NO_INTERVAL, Interval
 
 
 @dataclass(frozen=True)
@@ -83,7 +80,9 @@ def describe_layer(
     place, score = layers.index(preset), score_rows(rows)
     if place == 0:
         lost = lost_episodes(None, rows)
-        return LayerRow(preset, policy, score, _NOTHING, _NOTHING, _NOTHING, len(lost), explain(lost))
+        return LayerRow(
+            preset, policy, score, NO_INTERVAL, NO_INTERVAL, NO_INTERVAL, len(lost), explain(lost)
+        )
     first, before = flown[layers[0]][policy], flown[layers[place - 1]][policy]
     lost, step, fall = lost_episodes(before, rows), success_drop(before, rows), success_drop(first, rows)
     price = propellant_rise(first, rows)
@@ -152,7 +151,7 @@ def compare_order(flown: Mapping[str, Rows]) -> list[PairRow]:
     found = []
     for (better, other), was, stays in zip(pairs, first, last, strict=True):
         leads = tuple(_lead(layer[better], layer[other]) for layer in layers)
-        fall = _NOTHING if was == 0 else extra_fall(layers[0], layers[-1], better, other)
+        fall = NO_INTERVAL if was == 0 else extra_fall(layers[0], layers[-1], better, other)
         found.append(PairRow(better, other, leads, fall, judge_order(was, stays)))
     return found
 

@@ -31,6 +31,10 @@ class Interval:
     high: float
 
 
+NO_INTERVAL = Interval(math.nan, math.nan, math.nan)
+"""Where there is nothing to estimate: an empty cell in tables."""
+
+
 def wilson_interval(successes: int, episodes: int, confidence: float = 0.95) -> Interval:
     """Interval of a success ratio over independent episodes (Wilson 1927).
 

@@ -20,9 +20,7 @@ from studies.campaign.score import (
 )
 from studies.columns import Column, format_p
 from studies.statistics.paired import CHANCE, decide_leads
-from studies.statistics.ratios import Interval
-
-_NOTHING = Interval(math.nan, math.nan, math.nan)
+from studies.statistics.ratios import NO_INTERVAL, Interval
 
 
 class Standing(StrEnum):
@@ -115,9 +113,9 @@ def compare_to(preset: str, rows: Rows, reference: str) -> list[StandingRow]:
             policy=name,
             score=score_rows(flown),
             failures=sum(not row.success for row in flown),
-            fails_more=_NOTHING,
+            fails_more=NO_INTERVAL,
             holm_p=math.nan,
-            burns_more=_NOTHING,
+            burns_more=NO_INTERVAL,
             standing=Standing.REFERENCE,
         )
         if name != reference:

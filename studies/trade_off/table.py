@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -10,9 +9,7 @@ from rich.console import Console
 
 from studies.campaign.score import PROPELLANT_COLUMN, RATIO_COLUMNS, Score, scaled
 from studies.columns import Column, Output, console_table
-from studies.statistics.ratios import Interval
-
-_NO_CEILING = Interval(math.nan, math.nan, math.nan)  # an empty cell
+from studies.statistics.ratios import NO_INTERVAL, Interval
 
 
 @dataclass(frozen=True)
@@ -76,7 +73,7 @@ class Bounds:
 
 
 def _ceiling_percent(bounds: Bounds) -> Interval:
-    return _NO_CEILING if bounds.ceiling is None else scaled(bounds.ceiling, 100.0)
+    return NO_INTERVAL if bounds.ceiling is None else scaled(bounds.ceiling, 100.0)
 
 
 def _mark(row: TradeOffRow) -> str:

@@ -14,10 +14,9 @@ from hda.task.presets import PRESETS
 from hda.task.scenario import sample_scenario
 from rl.environment.native.stepped_vector import SteppedVectorEnv
 from rl.inference.artefacts import load_artefact
-from rl.policies.actor import AgentPolicy
-from rl.policies.recurrent_actor import RecurrentAgentPolicy
+from rl.policies.catalogue import policy_from_card
 from rl.recipes import RECIPES
-from rl.settings import WITH_MEMORY, AgentSettings
+from rl.settings import AgentSettings
 from rl.training.actor_export import policy_of
 from rl.training.run import make_environment, run_training
 from rl.training.run_folder import TrainingPlan
@@ -49,9 +48,8 @@ def learn_cut_and_whole(tmp_path: Path, preset: str, settings: AgentSettings, na
     a, b = (load_artefact(folder / "actors" / "step-000000036", "actor") for folder in (whole, cut))
     assert set(a.tensors) == set(b.tensors)
     assert all(np.array_equal(tensor, b.tensors[key]) for key, tensor in a.tensors.items())
-    kind = RecurrentAgentPolicy if settings.algorithm in WITH_MEMORY else AgentPolicy
     scenario = sample_scenario(preset, 0, 0, "tuning")
-    shipped = fly(kind("agent", whole / "actors" / "step-000000036"), scenario)
+    shipped = fly(policy_from_card("agent", whole / "actors" / "step-000000036"), scenario)
     assert shipped.decisions
     assert all(np.isfinite(decision.site).all() for decision in shipped.decisions)
     kept = fly(policy_of(a.tensors, settings), scenario)  # as the run itself judged it
