@@ -9,6 +9,7 @@ run this file with PYTHONPATH set to a checkout of that code. `make bench` times
 
 from __future__ import annotations
 
+import argparse
 import statistics
 import sys
 import time
@@ -39,9 +40,13 @@ def measure_step(name: str, count: int, threads: int) -> tuple[float, float]:
 
 
 if __name__ == "__main__":
-    environment, *numbers = sys.argv[1:] or ["rl:LunarHDA-v0"]
-    many, own = (int(number) for number in [*numbers, "1", "1"][:2])
-    clock, used = measure_step(environment, many, own)
+    parser = argparse.ArgumentParser(description="Time of a step of one environment or of many.")
+    parser.add_argument("environment", nargs="?", default="rl:LunarHDA-v0", help="id (default %(default)s)")
+    parser.add_argument("count", nargs="?", type=int, default=1, help="many at a time; 1: gymnasium.make")
+    parser.add_argument("threads", nargs="?", type=int, default=1, help="of the native vector")
+    wanted = parser.parse_args()
+    clock, used = measure_step(wanted.environment, wanted.count, wanted.threads)
     sys.stdout.write(
-        f"{environment}, {many} at a time: {1e6 * clock:.0f} us a step, {1e6 * used:.0f} of the processor\n"
+        f"{wanted.environment}, {wanted.count} at a time: {1e6 * clock:.0f} us a step, "
+        f"{1e6 * used:.0f} of the processor\n"
     )

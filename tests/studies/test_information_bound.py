@@ -3,6 +3,7 @@
 import csv
 import io
 import math
+from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise, product
 from pathlib import Path
@@ -17,6 +18,7 @@ from matplotlib.image import imread
 
 import guidance
 from guidance.rigid_body.body import DEFAULT_BODY
+from hda import registry
 from hda.flight.episode import begin_flight, fly, observe
 from hda.flight.episode_row import summarize_episode
 from hda.policies.beliefs.belief import SafetyBelief
@@ -56,6 +58,14 @@ from studies.statistics.ratios import Interval
 LANDER, GRAVITY = guidance.PAPER_LANDER, np.array(guidance.MOON_GRAVITY)
 START = guidance.State(np.array([200.0, 100.0, 950.0]), np.array([-8.0, -4.0, -30.0]), 1200.0)
 SMALL = InformationBound(episodes=3, looks=(0, 99), workers=1)
+
+
+@pytest.fixture(autouse=True, scope="module")
+def own_registry() -> Iterator[None]:
+    """The study registers the policies that are told the map; other tests must not see them."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(registry, "REGISTRY", registry.REGISTRY.copy())
+        yield
 
 
 def spent(propellant: float) -> float:
