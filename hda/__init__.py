@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from hda.ground.library import SPLITS, Ground, load_tile, prepare_tiles
     from hda.ground.tile import Tile, make_tile
     from hda.navigation.filter import navigate
+    from hda.navigation.flown_path import FlownPath
     from hda.navigation.navigation_state import NavigationState, begin_navigation
     from hda.navigation.sensors import Altimeter, InertialUnit, SiteFixes, TerrainFixes, Velocimeter
     from hda.navigation.system import NavigationSystem
@@ -44,6 +45,7 @@ _HOMES = {
     "hda.ground.library": ("SPLITS", "Ground", "load_tile", "prepare_tiles"),
     "hda.ground.tile": ("Tile", "make_tile"),
     "hda.navigation.filter": ("navigate",),
+    "hda.navigation.flown_path": ("FlownPath",),
     "hda.navigation.navigation_state": ("NavigationState", "begin_navigation"),
     "hda.navigation.sensors": ("Altimeter", "InertialUnit", "SiteFixes", "TerrainFixes", "Velocimeter"),
     "hda.navigation.system": ("NavigationSystem",),
@@ -74,6 +76,7 @@ __all__ = [
     "DecisionStatus",
     "Ending",
     "EpisodeRecord",
+    "FlownPath",
     "Ground",
     "GroundTouchdown",
     "InertialUnit",

@@ -9,7 +9,7 @@ from __future__ import annotations
 import time as clock
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -114,6 +114,7 @@ def observe(scenario: Scenario, flight: Flight) -> Observation:
         noise = scenario.streams.look(flight.index, lidar.pixels)
         axis = None if body is None else sensor_axis(body.attitude)
         safety_map = look(lidar, position, aim, scenario.tile.probability, noise, axis)
+    turning = _believe_turning(scenario, flight)
     return Observation(
         index=flight.index,
         time=flight.index * rules.decision_interval,
@@ -125,20 +126,30 @@ def observe(scenario: Scenario, flight: Flight) -> Observation:
         ground=ground,
         stance=stance,
         covariance=None if navigation is None else navigation.relative_covariance,
-        **_observe_attitude(scenario, flight),
+        attitude=turning.attitude,
+        rates=turning.rates,
+        attitude_covariance=turning.covariance,
     )
 
 
-def _observe_attitude(scenario: Scenario, flight: Flight) -> dict[str, Array | None]:
-    """What the lander believes of its attitude; nothing of a point mass."""
+class _BelievedTurning(NamedTuple):
+    """Attitude, rates and covariance of an observation; nothing of a point mass."""
+
+    attitude: Array | None = None
+    rates: Array | None = None
+    covariance: Array | None = None
+
+
+def _believe_turning(scenario: Scenario, flight: Flight) -> _BelievedTurning:
+    """What the lander believes of its attitude."""
     body, navigation = flight.body, flight.navigation
     if body is None:
-        return {}
-    return {
-        "attitude": believed_attitude(body.attitude, estimation.attitude_error(navigation)),
-        "rates": body.rates + estimation.rate_error(scenario, navigation, flight.index),
-        "attitude_covariance": None if navigation is None else navigation.attitude_covariance,
-    }
+        return _BelievedTurning()
+    return _BelievedTurning(
+        believed_attitude(body.attitude, estimation.attitude_error(navigation)),
+        body.rates + estimation.rate_error(scenario, navigation, flight.index),
+        None if navigation is None else navigation.attitude_covariance,
+    )
 
 
 def advance(scenario: Scenario, flight: Flight, decision: Decision) -> Step:

@@ -25,7 +25,7 @@ from hda.flight.held_thrust import (
 )
 from hda.flight.rigid.pointing import aim_ahead, aim_along, steer_across
 from hda.flight.rigid.turning import PlainTurning, feel_engine, keep_state, name_turning, read_gyro, turn_of
-from hda.navigation.steering import PlainSensing, Sensing, name_sensing, sense
+from hda.navigation.steering import FlownPeriod, PlainSensing, Sensing, name_sensing, sense
 from hda.safety.touchdown_stance import Footing
 
 _LEAST_TELLING = 0.05  # [m/s^2] commanded acceleration under which the engine's error is not estimated
@@ -118,7 +118,8 @@ def _fly_zem_zev(
         if status != FLYING:
             return k + 2, status, limited
         turn = turn_of(conditions.turning, sensing, k)
-        sense(sensing, (path[k], path[k + 1], flown, k, turn), gravity, conditions.navigation_error)
+        period_flown = FlownPeriod(path[k], path[k + 1], flown, k, turn)
+        sense(sensing, period_flown, gravity, conditions.navigation_error)
     return periods + 1, FLYING, limited
 
 
@@ -174,7 +175,7 @@ def _fly_plan(
         if status != FLYING:
             return k + 2, status, limited
         turn = turn_of(conditions.turning, sensing, k)
-        sense(sensing, (path[k], path[k + 1], flown, k, turn), gravity, navigation)
+        sense(sensing, FlownPeriod(path[k], path[k + 1], flown, k, turn), gravity, navigation)
         told = _estimate_error(path[k], path[k + 1], commanded[k], period, gravity, estimate)
         least = _LEAST_TELLING * path[k, 6] * period
         estimate = feel_engine(conditions.turning, estimate, told, least)

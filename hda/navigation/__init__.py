@@ -1,12 +1,11 @@
 """Where the lander believes it is: its navigation sensors, and the filter that makes an estimate of them.
 
 `sensors` and `system` say what is aboard, `sensor_errors` what chance does to it. `navigation_state` is what
-the filter knows, `filter` takes it along a flight, `site_tracking` puts the landing site into it. The other
-modules are their kernels: `layout` names the numbers, `propagation` is the inertial unit, `attitude` that of
-a turning body, `readings` and
-`site_fixes` are the other sensors, `schmidt_update` takes a measurement in, `control_period` takes the filter
-over one period or along a path, `steering` calls it in the vehicle's loop. It sees the ground by
-`hda.sensing`; the task and the simulator import it.
+the filter knows, `filter` takes it along a `flown_path`, `site_tracking` puts the landing site into it. The
+other modules are their kernels: `layout` names the numbers, `propagation` is the inertial unit, `attitude`
+that of a turning body, `readings` and `site_fixes` are the other sensors, `schmidt_update` takes a
+measurement in, `control_period` takes the filter over one period or along a path, `steering` calls it in the
+vehicle's loop. It sees the ground by `hda.sensing`; the task and the simulator import it.
 """
 
 from typing import TYPE_CHECKING
@@ -15,6 +14,7 @@ from guidance.exports import lazy_exports
 
 if TYPE_CHECKING:
     from hda.navigation.filter import NavigationLog, measure_ranges, navigate
+    from hda.navigation.flown_path import FlownPath
     from hda.navigation.navigation_state import NavigationState, begin_navigation
     from hda.navigation.sensor_errors import (
         FixDraws,
@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "hda.navigation.filter": ("NavigationLog", "measure_ranges", "navigate"),
+    "hda.navigation.flown_path": ("FlownPath",),
     "hda.navigation.navigation_state": ("NavigationState", "begin_navigation"),
     "hda.navigation.sensor_errors": (
         "FixDraws",
@@ -62,6 +63,7 @@ __all__ = [
     "NAVIGATION_FAULTS",
     "Altimeter",
     "FixDraws",
+    "FlownPath",
     "Gyroscope",
     "InertialUnit",
     "NavigationLog",

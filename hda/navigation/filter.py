@@ -16,8 +16,9 @@ from guidance.arrays import Array
 from guidance.constants import MOON_GRAVITY
 from guidance.validation import finite_vector
 from hda.navigation.control_period import TurningPath, navigate_path, range_down
-from hda.navigation.layout import ESTIMATED, GYRO_COLUMNS, SIZE, TURNING_SIZE
-from hda.navigation.navigation_state import NavigationState
+from hda.navigation.flown_path import FlownPath
+from hda.navigation.layout import GYRO_COLUMNS
+from hda.navigation.navigation_state import NavigationState, check_begun
 from hda.navigation.sensor_errors import ReadingDraws, SensorErrors
 from hda.navigation.system import NavigationSystem
 
@@ -58,7 +59,7 @@ def measure_ranges(elevation: NDArray[np.float32], path: Array, errors: SensorEr
 def navigate(
     system: NavigationSystem,
     navigation: NavigationState,
-    flown: tuple[Array, Array, Array] | tuple[Array, Array, Array, Array],
+    flown: FlownPath,
     draws: ReadingDraws,
     gravity: ArrayLike = MOON_GRAVITY,
     control_period: float | None = None,
@@ -68,10 +69,7 @@ def navigate(
     Args:
         system: sensors and filter.
         navigation: the filter at the path's first node, begun by a system with a gyroscope as this has one.
-        flown: times of n control instants [s] shape (n,), true states there (x y z vx vy vz m) shape (n, 7),
-            and ranges down [m] at the nodes after the first, shape (n - 1,), NaN where there is no ground.
-            Instants are one control period apart; the last may come at another time, where the flight ends.
-            With a gyroscope also the true attitudes there, unit quaternions, shape (n, 4).
+        flown: the path, of n nodes, with attitudes where the system has a gyroscope.
         draws: for at least n - 1 periods.
         gravity: [m/s^2] shape (3,).
         control_period: [s]; the path's first interval if left out.
@@ -80,14 +78,14 @@ def navigate(
         The filter at the path's last node, and what it went through.
 
     Raises:
-        ValueError: the shapes do not fit one another, the filter was begun without the system's gyroscope or
-            with one that it lacks, there are too few draws, the intervals but the last are not the control
-            period, a sensor is not read at a whole number of periods, or attitudes are lacking where there
-            is a gyroscope.
+        ValueError: the filter was begun without the system's gyroscope or with one that it lacks, there are
+            too few draws, the intervals but the last are not the control period, a sensor is not read at a
+            whole number of periods, or attitudes are lacking where there is a gyroscope.
     """
-    _check_begun(system, navigation)
-    periods = _check_flown(flown, draws)
-    time, path, heights = flown[:3]
+    check_begun(system, navigation)
+    periods, time = flown.periods, flown.time
+    if draws.normal.shape[0] < periods:
+        raise ValueError(f"draws must be for {periods} periods, got {draws.normal.shape[0]}")
     period = float(time[1] - time[0]) if control_period is None else control_period
     if np.abs(np.diff(time)[:-1] - period).max(initial=0.0) > 1e-6 * period:
         raise ValueError(f"flown: all intervals but the last must be of one control period, {period:g} s")
@@ -99,10 +97,10 @@ def navigate(
         np.empty((periods, 3)),
         np.empty((periods, 3)),
     )
-    turning = _turning_path(system, flown[3:], draws, period)
+    turning = _turning_path(system, flown, draws, period)
     navigate_path(
         memory,
-        (time, path, heights, navigation.instant, turning),
+        (time, flown.states, flown.ranges, navigation.instant, turning),
         finite_vector("gravity", gravity, 3),
         errors,
         (draws.normal, draws.uniform),
@@ -113,44 +111,19 @@ def navigate(
     return NavigationState(*memory, after, navigation.instant + periods), log
 
 
-def _check_begun(system: NavigationSystem, navigation: NavigationState) -> None:
-    """Refuse a filter of another size than the system's: the kernels would reach beyond its arrays."""
-    turning = system.gyroscope is not None
-    rows, size = (TURNING_SIZE, TURNING_SIZE) if turning else (ESTIMATED, SIZE)
-    if navigation.estimate.shape != (rows,) or navigation.covariance.shape != (size, size):
-        kind = "with" if turning else "without"
-        raise ValueError(
-            f"navigation must be of a system {kind} a gyroscope, as system is, with an estimate of {rows}"
-            f" numbers, got {navigation.estimate.size}"
-        )
-
-
-def _check_flown(flown: tuple[Array, ...], draws: ReadingDraws) -> int:
-    """How many control periods were flown; refuses shapes that do not fit together."""
-    time, path, heights = flown[:3]
-    periods = time.size - 1
-    if periods < 1 or path.shape != (periods + 1, 7) or heights.shape != (periods,):
-        raise ValueError(f"flown: shapes {time.shape}, {path.shape} and {heights.shape} do not fit together")
-    if any(attitude.shape != (periods + 1, 4) for attitude in flown[3:]):
-        raise ValueError(f"flown: attitudes must have shape {(periods + 1, 4)}, got {flown[-1].shape}")
-    if draws.normal.shape[0] < periods:
-        raise ValueError(f"draws must be for {periods} periods, got {draws.normal.shape[0]}")
-    return periods
-
-
 def _turning_path(
-    system: NavigationSystem, attitudes: tuple[Array, ...], draws: ReadingDraws, period: float
+    system: NavigationSystem, flown: FlownPath, draws: ReadingDraws, period: float
 ) -> TurningPath | None:
     """How the body turned along a path; None without a gyroscope."""
     if system.gyroscope is None:
         return None
-    if not attitudes or draws.gyro is None:
+    if flown.attitudes is None or draws.gyro is None:
         raise ValueError(
             "flown must have attitudes, and draws must be for a gyroscope, as the system has one"
         )
-    periods, found = len(attitudes[0]) - 1, draws.gyro.shape
+    periods, found = flown.periods, draws.gyro.shape
     if len(found) != 2 or found[0] < periods or found[1] != GYRO_COLUMNS:
         raise ValueError(
             f"draws: gyro must have shape (n, {GYRO_COLUMNS}), n at least {periods}, got {found}"
         )
-    return TurningPath(attitudes[0], draws.gyro, system.gyroscope.numbers, period)
+    return TurningPath(flown.attitudes, draws.gyro, system.gyroscope.numbers, period)

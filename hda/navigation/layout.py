@@ -38,7 +38,7 @@ SENSORS = 4
 """How many."""
 
 IMU_VELOCITY, IMU_POSITION, BIAS_STEP, ALTIMETER_NOISE, BEAM_NOISE, FIX_NOISE = 0, 3, 6, 9, 10, 13
-"""First column of each noise in a row of `NavigationDraws.normal`."""
+"""First column of each noise in a row of `ReadingDraws.normal`."""
 NORMAL_COLUMNS = 16
 """Standard normal draws of one control period."""
 UNIFORM_COLUMNS = 3

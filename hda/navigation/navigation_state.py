@@ -133,3 +133,22 @@ def begin_navigation(
     sigma[TILT : TILT + 3] = system.inertial.tilt
     sigma[GYRO_BIAS:] = 0.0 if gyroscope is None else gyroscope.bias
     return NavigationState(estimate, np.diag(sigma**2), np.zeros(SENSORS, dtype=np.int64), errors)
+
+
+def check_begun(system: NavigationSystem, navigation: NavigationState) -> None:
+    """Refuse a filter of another size than the system's: the kernels would reach beyond its arrays.
+
+    Raises:
+        ValueError: the filter was begun without the system's gyroscope or with one that it lacks, or its
+            arrays have shapes that no system gives.
+    """
+    turning = system.gyroscope is not None
+    rows, size = (TURNING_SIZE, TURNING_SIZE) if turning else (ESTIMATED, SIZE)
+    arrays = navigation.estimate, navigation.covariance, navigation.rejections
+    expected, found = ((rows,), (size, size), (SENSORS,)), tuple(array.shape for array in arrays)
+    if found != expected:
+        kind = "with" if turning else "without"
+        raise ValueError(
+            f"navigation must be of a system {kind} a gyroscope, as system is: estimate, covariance and"
+            f" rejections of shapes {expected}, got {found}"
+        )

@@ -11,7 +11,7 @@ from guidance.arrays import Array
 from guidance.validation import finite_vector
 from hda.navigation.attitude import correct_attitude
 from hda.navigation.layout import SITE, SITE_FIX, FilterMemory
-from hda.navigation.navigation_state import NavigationState
+from hda.navigation.navigation_state import NavigationState, check_begun
 from hda.navigation.sensor_errors import FixDraws
 from hda.navigation.sensors import SiteFixes
 from hda.navigation.site_fixes import acquire_site, fix_site, measure_site
@@ -27,11 +27,15 @@ def find_site(
 
     Args:
         system: sensors and filter; without `system.site` the look is taken to be as good as one by default.
-        navigation: the filter.
+        navigation: the filter, begun by a system with a gyroscope as this has one.
         position: [m] shape (3,), the vehicle's true position.
         site: [m] shape (3,), the site's true place.
         draws: of this look; a first look is never without its site.
+
+    Raises:
+        ValueError: the filter was begun without the system's gyroscope or with one that it lacks.
     """
+    check_begun(system, navigation)
     deviation = _look_deviation(system, position, site)
     reading = measure_site(site - position, navigation.errors.tilt.copy(), deviation, draws.normal)
     memory = navigation.memory()
@@ -46,14 +50,18 @@ def track_site(
 
     Args:
         system: sensors and filter.
-        navigation: the filter.
+        navigation: the filter, begun by a system with a gyroscope as this has one.
         position: [m] shape (3,), the vehicle's true position.
         site: [m] shape (3,), the site's true place.
         draws: of this look.
 
     Returns:
         The filter, and the squared innovation of the fix (3 degrees of freedom), NaN where there was none.
+
+    Raises:
+        ValueError: the filter was begun without the system's gyroscope or with one that it lacks.
     """
+    check_begun(system, navigation)
     fixes = system.site
     slant = float(np.linalg.norm(site - position))
     if fixes is None or slant < fixes.floor or draws.uniform < fixes.dropout:

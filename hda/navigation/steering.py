@@ -142,10 +142,28 @@ def plain_sensing(sensing: Sensing) -> PlainSensing:
     return (tuple(sensing.memory), tuple(sensing.errors), *sensing[2:4], plain, *sensing[5:9], gyro)  # pyright: ignore[reportReturnType]
 
 
+class FlownPeriod(NamedTuple):
+    """One control period as it was really flown.
+
+    Attributes:
+        before: true state (x y z vx vy vz m) before it, shape (7,).
+        after: true state after it.
+        time: [s] that it took.
+        number: of the period in its interval.
+        turn: how a body with a gyroscope turned in it; None: there is none.
+    """
+
+    before: Array
+    after: Array
+    time: float
+    number: int
+    turn: Turn | None
+
+
 @compile_kernel
 def sense(
     sensing: Sensing | None,
-    flown: tuple[Array, Array, float, int, Turn | None],
+    flown: FlownPeriod,
     gravity: Array,
     estimation_error: Array,
 ) -> None:
@@ -157,8 +175,7 @@ def sense(
     Args:
         sensing: the filter; changed in place. None: the error of the estimate stays as it is, and numba
             compiles nothing of the filter.
-        flown: true states (x y z vx vy vz m) before and after, the time between [s], the number of the
-            period in its interval, and how a body with a gyroscope turned in it.
+        flown: the period.
         gravity: [m/s^2] shape (3,).
         estimation_error: shape (6,), estimated minus true position [m] and velocity [m/s]; written in place.
     """

@@ -10,7 +10,15 @@ from scipy.stats import chi2
 
 import hda
 from hda.flight.episode import Flight, advance, begin_flight, fly_legs, inform_pilot, observe
-from hda.navigation import NavigationSystem, SiteFixes, choose_site, measure_ranges, navigate, track_site
+from hda.navigation import (
+    FlownPath,
+    NavigationSystem,
+    SiteFixes,
+    choose_site,
+    measure_ranges,
+    navigate,
+    track_site,
+)
 from hda.task.estimation import estimation_error
 from hda.task.presets import PRESETS, Preset
 from hda.task.scenario import Scenario, frame_point, ground_point
@@ -53,7 +61,7 @@ def test_the_loop_runs_the_same_filter_as_goes_along_the_flown_path(law: str):
             started = choose_site(before.navigation, after.target - before.target)
             ranges = measure_ranges(scenario.tile.elevation, segment.path[1:], started.errors)
             draws = scenario.streams.readings(before.index, len(ranges))
-            along, _ = navigate(system, started, (segment.time, segment.path, ranges), draws)
+            along, _ = navigate(system, started, FlownPath(segment.time, segment.path, ranges), draws)
             really, look = ground_point(scenario, after.target), scenario.streams.site_fix(after.index)
             fixed, _ = track_site(system, along, after.state.position, really, look)
             np.testing.assert_allclose(after.navigation.estimate, fixed.estimate, rtol=1e-9, atol=1e-9)

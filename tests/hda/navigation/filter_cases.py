@@ -10,6 +10,7 @@ from guidance.lander import PAPER_LANDER
 from guidance.state import State
 from guidance.zem_zev import saturate_thrust, time_to_go, zem_zev_acceleration
 from hda.navigation import (
+    FlownPath,
     NavigationState,
     NavigationSystem,
     begin_navigation,
@@ -104,9 +105,8 @@ def run_filter(system: NavigationSystem, descent: Descent, ground: Array, rng: n
             navigation, square = track_site(system, navigation, path[first, :3], TARGET, draw_fix(rng))
             site_squares.append(square)
         heights = (path[:, 2] - ground)[first + 1 : last + 1]
-        leg = (time[first : last + 1], path[first : last + 1], heights)
-        if descent.attitude is not None:
-            leg = (*leg, descent.attitude[first : last + 1])
+        attitudes = None if descent.attitude is None else descent.attitude[first : last + 1]
+        leg = FlownPath(time[first : last + 1], path[first : last + 1], heights, attitudes)
         draws = draw_readings(rng, last - first, gyroscope=descent.attitude is not None)
         navigation, log = navigate(system, navigation, leg, draws)
         squares.append(log.innovation_square)

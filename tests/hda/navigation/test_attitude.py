@@ -15,6 +15,7 @@ from scipy.stats import chi2
 from guidance.arrays import Array
 from guidance.state import State
 from hda.navigation import (
+    FlownPath,
     Gyroscope,
     InertialUnit,
     NavigationLog,
@@ -47,7 +48,7 @@ def hover(system: NavigationSystem, duration: float, attitude: Array) -> Navigat
     state = State(np.array([0.0, 0.0, 500.0]), np.zeros(3), 1200.0)
     start = begin_navigation(sure, state, TARGET, draw_sensor_errors(sure, np.random.default_rng(0)))
     path, periods = np.tile(state.as_array(), (time.size, 1)), time.size - 1
-    flown = (time, path, np.full(periods, np.nan), np.tile(attitude, (time.size, 1)))
+    flown = FlownPath(time, path, np.full(periods, np.nan), np.tile(attitude, (time.size, 1)))
     after, _ = navigate(sure, start, flown, draw_readings(np.random.default_rng(1), periods, gyroscope=True))
     return after
 
@@ -138,7 +139,7 @@ def read_once(lean: float, tilt: Array, height: float = 300.0) -> tuple[Navigati
     path = np.tile(state.as_array(), (2, 1))
     path[1, :3] += 0.5 * path[1, 3:6]
     attitude = Rotation.from_rotvec([0.0, lean, 0.0]).as_quat(scalar_first=True)
-    flown = (np.array([0.0, 0.5]), path, np.array([height]), np.tile(attitude, (2, 1)))
+    flown = FlownPath(np.array([0.0, 0.5]), path, np.array([height]), np.tile(attitude, (2, 1)))
     draws = ReadingDraws(np.zeros((1, 16)), np.zeros((1, 3)), np.zeros((2, 6)))
     start = begin_navigation(quiet, state, TARGET, errors)
     return navigate(quiet, start, flown, draws)
@@ -230,35 +231,36 @@ def test_an_attitude_that_errs_far_more_still_errs_as_it_says(swaying: list[Desc
     assert across < 0.6 * alone
 
 
+def stand(state: State) -> FlownPath:
+    """Two periods of an upright body that does not move, 1 m above the ground."""
+    time, states = 0.5 * np.arange(3, dtype=np.float64), np.tile(state.as_array(), (3, 1))
+    return FlownPath(time, states, np.ones(2), np.tile(UPRIGHT, (3, 1)))
+
+
 def test_a_path_without_attitudes_is_refused_where_there_is_a_gyroscope():
     state = State(np.array([0.0, 0.0, 500.0]), np.zeros(3), 1200.0)
     start = begin_navigation(SYSTEM, state, TARGET, draw_sensor_errors(SYSTEM, np.random.default_rng(0)))
-    time, path = 0.5 * np.arange(3, dtype=np.float64), np.tile(state.as_array(), (3, 1))
     draws = draw_readings(np.random.default_rng(0), 2, gyroscope=True)
     with pytest.raises(ValueError, match="must have attitudes"):
-        navigate(SYSTEM, start, (time, path, np.ones(2)), draws)
-    with pytest.raises(ValueError, match="attitudes must have shape"):
-        navigate(SYSTEM, start, (time, path, np.ones(2), np.tile(UPRIGHT, (2, 1))), draws)
+        navigate(SYSTEM, start, replace(stand(state), attitudes=None), draws)
 
 
 @pytest.mark.parametrize(("begun", "taken_on"), [(ALONE, SYSTEM), (SYSTEM, ALONE)])
 def test_a_filter_of_a_system_with_other_rows_is_refused(begun: NavigationSystem, taken_on: NavigationSystem):
     state = State(np.array([0.0, 0.0, 500.0]), np.zeros(3), 1200.0)
     start = begin_navigation(begun, state, TARGET, draw_sensor_errors(begun, np.random.default_rng(0)))
-    time, path = 0.5 * np.arange(3, dtype=np.float64), np.tile(state.as_array(), (3, 1))
     draws = draw_readings(np.random.default_rng(0), 2, gyroscope=True)
     with pytest.raises(ValueError, match=r"navigation must be of a system with(out)? a gyroscope"):
-        navigate(taken_on, start, (time, path, np.ones(2), np.tile(UPRIGHT, (3, 1))), draws)
+        navigate(taken_on, start, stand(state), draws)
 
 
 @pytest.mark.parametrize("shape", [(1, 6), (2, 5), (12,)])
 def test_draws_of_a_gyroscope_that_do_not_fit_are_refused(shape: tuple[int, ...]):
     state = State(np.array([0.0, 0.0, 500.0]), np.zeros(3), 1200.0)
     start = begin_navigation(SYSTEM, state, TARGET, draw_sensor_errors(SYSTEM, np.random.default_rng(0)))
-    time, path = 0.5 * np.arange(3, dtype=np.float64), np.tile(state.as_array(), (3, 1))
     draws = replace(draw_readings(np.random.default_rng(0), 2), gyro=np.zeros(shape))
     with pytest.raises(ValueError, match="gyro must have shape"):
-        navigate(SYSTEM, start, (time, path, np.ones(2), np.tile(UPRIGHT, (3, 1))), draws)
+        navigate(SYSTEM, start, stand(state), draws)
 
 
 @pytest.mark.parametrize("name", ["noise", "bias", "correlation_time"])

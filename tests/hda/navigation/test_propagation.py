@@ -8,12 +8,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from guidance.arrays import Array
 from guidance.constants import STANDARD_GRAVITY
 from guidance.dynamics import propagate
 from guidance.lander import PAPER_LANDER
 from guidance.state import State
-from hda.navigation import InertialUnit, ReadingDraws, begin_navigation, draw_sensor_errors, navigate
+from hda.navigation import (
+    FlownPath,
+    InertialUnit,
+    ReadingDraws,
+    begin_navigation,
+    draw_sensor_errors,
+    navigate,
+)
 from hda.navigation.layout import ESTIMATED, GROUND, SIZE, TILT, FilterMemory
 from hda.navigation.propagation import carry
 from tests.hda.navigation.filter_cases import ALONE, GRAVITY, TARGET, fly_descent
@@ -22,10 +28,10 @@ SEEDS = st.integers(0, 2**32 - 1)
 HOVER = State(np.array([0.0, 0.0, 500.0]), np.zeros(3), 1200.0)
 
 
-def hover(duration: float, period: float = 0.5) -> tuple[Array, Array, Array]:
+def hover(duration: float, period: float = 0.5) -> FlownPath:
     """Standing still above no known ground."""
     time = period * np.arange(round(duration / period) + 1, dtype=np.float64)
-    return time, np.tile(HOVER.as_array(), (time.size, 1)), np.full(time.size - 1, np.nan)
+    return FlownPath(time, np.tile(HOVER.as_array(), (time.size, 1)), np.full(time.size - 1, np.nan))
 
 
 def no_chance(periods: int) -> ReadingDraws:
@@ -37,7 +43,7 @@ def deviations(unit: InertialUnit, duration: float) -> np.ndarray:
     system = replace(ALONE, inertial=unit, horizontal_error=0.0, vertical_error=0.0, velocity_error=0.0)
     start = begin_navigation(system, HOVER, TARGET, draw_sensor_errors(system, np.random.default_rng(0)))
     flown = hover(duration)
-    after, _ = navigate(system, start, flown, no_chance(flown[0].size - 1))
+    after, _ = navigate(system, start, flown, no_chance(flown.periods))
     return np.sqrt(np.diag(after.covariance))[[0, 3]]
 
 
@@ -121,7 +127,7 @@ def test_the_unit_feels_what_the_engine_errs():
         system, State.parse(descent.path[0]), TARGET, draw_sensor_errors(system, np.random.default_rng(0))
     )
     periods = descent.time.size - 1
-    flown = (descent.time, descent.path, np.full(periods, np.nan))
+    flown = FlownPath(descent.time, descent.path, np.full(periods, np.nan))
     _, log = navigate(system, start, flown, no_chance(periods))
     np.testing.assert_allclose(log.estimate[:, :6], descent.path[1:, :6], atol=1e-9)
 
@@ -136,7 +142,8 @@ def test_a_held_thrust_is_integrated_exactly_whatever_the_period():
         time = np.linspace(0.0, 10.0, periods + 1)
         path = np.array([propagate(HOVER, thrust, t, PAPER_LANDER).as_array() for t in time])
         start = begin_navigation(system, HOVER, TARGET, errors)
-        after, _ = navigate(system, start, (time, path, np.full(periods, np.nan)), no_chance(periods))
+        flown = FlownPath(time, path, np.full(periods, np.nan))
+        after, _ = navigate(system, start, flown, no_chance(periods))
         ends.append((after.estimate, after.covariance))
     np.testing.assert_allclose(ends[0][0], ends[1][0], rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(ends[0][1], ends[1][1], rtol=1e-9, atol=1e-12)

@@ -1,5 +1,6 @@
 """The landing site in the filter: errors shared with the vehicle cancel in what a landing needs."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +11,7 @@ from hypothesis import strategies as st
 from guidance.state import State
 from hda.navigation import (
     FixDraws,
+    Gyroscope,
     NavigationState,
     NavigationSystem,
     SiteFixes,
@@ -104,3 +106,22 @@ def test_a_wrong_offset_is_named():
         choose_site(begin(SYSTEM), [1.0, np.nan, 0.0])
     with pytest.raises(ValueError, match="target"):
         begin_navigation(SYSTEM, HIGH, [1.0, 2.0], draw_sensor_errors(SYSTEM, np.random.default_rng(0)))
+
+
+TURNING = replace(SYSTEM, gyroscope=Gyroscope())
+
+
+@pytest.mark.parametrize("step", [find_site, track_site])
+@pytest.mark.parametrize(("begun", "taken_on"), [(SYSTEM, TURNING), (TURNING, SYSTEM)])
+def test_a_filter_of_a_system_with_other_rows_is_refused(
+    step: Callable[..., object], begun: NavigationSystem, taken_on: NavigationSystem
+):
+    draws = draw_fix(np.random.default_rng(0))
+    with pytest.raises(ValueError, match=r"navigation must be of a system with(out)? a gyroscope"):
+        step(taken_on, begin(begun), HIGH.position, TARGET, draws)
+
+
+def test_a_filter_with_too_small_an_array_is_refused_by_its_shapes():
+    small = replace(begin(SYSTEM), covariance=np.eye(13))
+    with pytest.raises(ValueError, match=r"got \(\(13,\), \(13, 13\), \(4,\)\)"):
+        find_site(SYSTEM, small, HIGH.position, TARGET, draw_fix(np.random.default_rng(0)))

@@ -5,11 +5,11 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from guidance.arrays import Array
 from guidance.state import State
 from hda.navigation import (
     NAVIGATION_FAULTS,
     Altimeter,
+    FlownPath,
     InertialUnit,
     NavigationState,
     NavigationSystem,
@@ -29,19 +29,21 @@ from tests.hda.navigation.filter_cases import TARGET, fly_descent, run_filter, w
 SYSTEM = NavigationSystem()
 
 
-def sink(top: float, speed: float = 10.0, periods: int = 40) -> tuple[Array, Array, Array]:
-    """Straight down from `top` above level ground at 0: times, states, ranges."""
+def sink(top: float, speed: float = 10.0, periods: int = 40) -> FlownPath:
+    """Straight down from `top` above level ground at 0."""
     time = 0.5 * np.arange(periods + 1, dtype=np.float64)
     path = np.zeros((periods + 1, 7))
     path[:, 2], path[:, 5], path[:, 6] = top - speed * time, -speed, 1200.0
-    return time, path, path[1:, 2].copy()
+    return FlownPath(time, path, path[1:, 2].copy())
 
 
-def readings(system: NavigationSystem, flown: tuple[Array, Array, Array], seed: int = 0) -> np.ndarray:
+def readings(system: NavigationSystem, flown: FlownPath, seed: int = 0) -> np.ndarray:
     """Whether altimeter, velocimeter and terrain fix read after each period."""
     rng = np.random.default_rng(seed)
-    start = begin_navigation(system, State.parse(flown[1][0]), np.zeros(3), draw_sensor_errors(system, rng))
-    _, log = navigate(system, start, flown, draw_readings(rng, flown[0].size - 1))
+    start = begin_navigation(
+        system, State.parse(flown.states[0]), np.zeros(3), draw_sensor_errors(system, rng)
+    )
+    _, log = navigate(system, start, flown, draw_readings(rng, flown.periods))
     return np.isfinite(log.innovation_square)
 
 
@@ -78,7 +80,7 @@ def test_the_gates_are_those_of_one_false_rejection_in_a_thousand():
 
 def test_each_sensor_reads_between_its_floor_and_its_ceiling_at_its_rate():
     flown = sink(600.0, speed=30.0)
-    heights = flown[2]
+    heights = flown.ranges
     altimeter, velocimeter, terrain = readings(SYSTEM, flown).T
     np.testing.assert_array_equal(altimeter, heights >= 1.0)
     np.testing.assert_array_equal(velocimeter, heights >= 30.0)
@@ -100,8 +102,8 @@ def test_a_sensor_that_is_not_there_never_reads():
 
 
 def test_no_ground_below_is_no_reading():
-    time, path, heights = sink(900.0)
-    assert not readings(SYSTEM, (time, path, np.full(heights.size, np.nan))).any()
+    flown = sink(900.0)
+    assert not readings(SYSTEM, replace(flown, ranges=np.full(flown.periods, np.nan))).any()
 
 
 def test_the_faults_do_what_they_are_called():
@@ -147,7 +149,7 @@ def test_equal_seeds_give_equal_bytes_and_memory_is_never_changed():
     streams = EpisodeStreams(3, 4)
     errors = draw_sensor_errors(SYSTEM, streams.navigation())
     flown = sink(800.0, periods=10)
-    start = begin_navigation(SYSTEM, State.parse(flown[1][0]), TARGET, errors)
+    start = begin_navigation(SYSTEM, State.parse(flown.states[0]), TARGET, errors)
     before = as_bytes(start)
     first, _ = navigate(SYSTEM, start, flown, streams.readings(0, 10))
     again, _ = navigate(SYSTEM, start, flown, streams.readings(0, 10))
@@ -163,31 +165,49 @@ def test_equal_seeds_give_equal_bytes_and_memory_is_never_changed():
 
 def test_a_path_in_two_parts_is_the_path_in_one():
     streams = EpisodeStreams(3, 5)
-    time, path, heights = sink(800.0, periods=20)
+    flown = sink(800.0, periods=20)
     errors = draw_sensor_errors(SYSTEM, streams.navigation())
-    start = begin_navigation(SYSTEM, State.parse(path[0]), TARGET, errors)
+    start = begin_navigation(SYSTEM, State.parse(flown.states[0]), TARGET, errors)
     draws = streams.readings(0, 20)
-    whole, _ = navigate(SYSTEM, start, (time, path, heights), draws)
-    half, _ = navigate(SYSTEM, start, (time[:8], path[:8], heights[:7]), draws)
+    parts = [
+        FlownPath(flown.time[:8], flown.states[:8], flown.ranges[:7]),
+        FlownPath(flown.time[7:], flown.states[7:], flown.ranges[7:]),
+    ]
+    whole, _ = navigate(SYSTEM, start, flown, draws)
+    half, _ = navigate(SYSTEM, start, parts[0], draws)
     rest = replace(draws, normal=draws.normal[7:], uniform=draws.uniform[7:])
-    other, _ = navigate(SYSTEM, half, (time[7:], path[7:], heights[7:]), rest)
+    other, _ = navigate(SYSTEM, half, parts[1], rest)
     assert as_bytes(whole) == as_bytes(other)
 
 
-def test_flown_parts_that_do_not_fit_are_refused():
-    time, path, heights = sink(800.0, periods=5)
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"time": np.zeros(5)},
+        {"time": np.zeros((2, 3))},
+        {"states": np.zeros((6, 6))},
+        {"ranges": np.zeros(3)},
+        {"time": np.zeros(1), "states": np.zeros((1, 7)), "ranges": np.zeros(0)},
+        {"attitudes": np.zeros((5, 4))},
+    ],
+)
+def test_parts_of_a_flown_path_that_do_not_fit_are_refused(wrong: dict[str, np.ndarray]):
+    with pytest.raises(ValueError, match=r"flown path: (shapes .* do not fit|attitudes must have shape)"):
+        replace(sink(800.0, periods=5), **wrong)
+
+
+def test_draws_and_intervals_that_do_not_fit_a_path_are_refused():
+    flown = sink(800.0, periods=5)
     rng = np.random.default_rng(0)
-    start = begin_navigation(SYSTEM, State.parse(path[0]), TARGET, draw_sensor_errors(SYSTEM, rng))
-    with pytest.raises(ValueError, match="flown"):
-        navigate(SYSTEM, start, (time, path, heights[:3]), draw_readings(rng, 5))
+    start = begin_navigation(SYSTEM, State.parse(flown.states[0]), TARGET, draw_sensor_errors(SYSTEM, rng))
     with pytest.raises(ValueError, match="draws must be for 5 periods, got 4"):
-        navigate(SYSTEM, start, (time, path, heights), draw_readings(rng, 4))
-    late = time.copy()
+        navigate(SYSTEM, start, flown, draw_readings(rng, 4))
+    late = flown.time.copy()
     late[-1] += 0.2  # where the flight ends
-    navigate(SYSTEM, start, (late, path, heights), draw_readings(rng, 5))
+    navigate(SYSTEM, start, replace(flown, time=late), draw_readings(rng, 5))
     late[2] += 0.1
     with pytest.raises(ValueError, match="all intervals but the last"):
-        navigate(SYSTEM, start, (late, path, heights), draw_readings(rng, 5))
+        navigate(SYSTEM, start, replace(flown, time=late), draw_readings(rng, 5))
 
 
 def test_a_sensor_is_read_at_whole_numbers_of_control_periods():
