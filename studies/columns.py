@@ -12,7 +12,7 @@ from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-from studies.statistics.ratios import Interval
+from studies.statistics.ratios import Interval, scaled
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -145,6 +145,57 @@ class Column(Generic[Row]):
         found += [] if self.by_tile is None else [self.by_tile(row)]
         told = [one for one in found if math.isfinite(one.low) and math.isfinite(one.high)]
         return [f"{self.show(one.low)}{self.between}{self.show(one.high)}" for one in told]
+
+
+def percent_interval(
+    key: str,
+    heading: str,
+    ratio: Callable[[Row], Interval],
+    *,
+    digits: int = 1,
+    label: str = "",
+    stem: str = "",
+) -> Column[Row]:
+    """A column of a ratio with its interval, in percent.
+
+    Args:
+        key: name in the file, with the unit.
+        heading: short name in tables.
+        ratio: gives the ratio of a line, in [0, 1].
+        digits: decimals that are shown.
+        label: name in full.
+        stem: name that the ends begin with in the file.
+    """
+
+    def percent(row: Row) -> Interval:
+        return scaled(ratio(row), 100.0)
+
+    return Column(key, heading, percent, digits, "%", label, interval=True, stem=stem)
+
+
+def points_interval(
+    key: str,
+    heading: str,
+    difference: Callable[[Row], Interval],
+    *,
+    digits: int = 1,
+    stem: str = "",
+    between: str = " to ",
+) -> Column[Row]:
+    """A column of a difference in percentage points with its interval, each with its sign.
+
+    Args:
+        key: name in the file, with the unit.
+        heading: short name in tables.
+        difference: gives that of a line, in points.
+        digits: decimals that are shown.
+        stem: name that the ends begin with in the file.
+        between: stands between the ends.
+    """
+    form = f"{{:+.{digits}f}}".format
+    return Column(
+        key, heading, difference, unit="points", interval=True, between=between, stem=stem, form=form
+    )
 
 
 def field_columns(kind: type[Any]) -> list[Column[Any]]:

@@ -9,13 +9,13 @@ what is kept, so that every algorithm of it works.
 from __future__ import annotations
 
 import re
-from contextlib import suppress
 from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
+from rich.console import Console
 
 from rl.environment.native.landing_vector import LandingVectorEnv
 from rl.environment.native.vector_snapshot import restore_snapshot, take_snapshot
@@ -79,10 +79,17 @@ def save_checkpoint(folder: Path, algorithm: Algorithm, env: Environment, card: 
 
 
 def newest_checkpoint(folder: Path) -> Path | None:
-    """Path (without suffix) of the newest checkpoint whose card is complete, or None."""
+    """Path (without suffix) of the newest checkpoint whose card is complete, or None.
+
+    Cards that are not are named on stderr.
+    """
     for card in sorted(folder.glob("checkpoint-*.json"), reverse=True):
-        with suppress(ArtefactError):
+        try:
             read_card(card, KIND)
+        except ArtefactError as error:
+            told = f"passed over: {error}"
+            Console(stderr=True).print(told, style="yellow", markup=False, highlight=False, soft_wrap=True)
+        else:
             return card.with_suffix("")
     return None
 

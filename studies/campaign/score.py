@@ -7,16 +7,22 @@ moments (`studies.statistics.moments`). Rows must come in the order of their epi
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hda.flight.episode_row import MEASURES, RATIOS, EpisodeRow
-from studies.columns import Column, Output
+from studies.columns import Column, Output, percent_interval
 from studies.statistics.moments import TileMoments, collect_moments, mean_intervals
 from studies.statistics.paired import paired_ratio_interval
-from studies.statistics.ratios import NO_INTERVAL, Interval, clustered_count_interval, wilson_interval
+from studies.statistics.ratios import (
+    NO_INTERVAL,
+    Interval,
+    clustered_count_interval,
+    scaled,
+    wilson_interval,
+)
 from studies.statistics.reliability import exact_lower_bound
 
 AT_LEAST_CONFIDENCE = 0.95
@@ -161,22 +167,11 @@ def propellant_rise(
     return mean_intervals(collect_moments(more, [row.tile for _, row in pairs]), 0, confidence)[1]
 
 
-def scaled(interval: Interval, factor: float) -> Interval:
-    """The interval in another unit, such as percent."""
-    return Interval(factor * interval.estimate, factor * interval.low, factor * interval.high)
-
-
 def _ratio_column(name: str, heading: str) -> Column[Score]:
-    return Column(
-        f"{name}_percent",
-        heading,
-        lambda score: scaled(getattr(score, name), 100.0),
-        digits=1,
-        unit="%",
-        interval=True,
-        by_tile=lambda score: scaled(getattr(score, f"{name}_by_tile"), 100.0),
-        stem=name,
+    plain: Column[Score] = percent_interval(
+        f"{name}_percent", heading, lambda score: getattr(score, name), stem=name
     )
+    return replace(plain, by_tile=lambda score: scaled(getattr(score, f"{name}_by_tile"), 100.0))
 
 
 def _mean_column(name: str, heading: str, label: str, unit: str, digits: int) -> Column[Score]:
@@ -228,14 +223,8 @@ MEASURE_COLUMNS = (
 )
 """The means, in the order of MEASURES."""
 
-DROP_COLUMN: Column[Interval] = Column(
-    "success_drop_points",
-    "drop",
-    lambda drop: scaled(drop, 100.0),
-    digits=1,
-    unit="points",
-    interval=True,
-    stem="drop",
+DROP_COLUMN: Column[Interval] = replace(
+    percent_interval("success_drop_points", "drop", lambda drop: drop, stem="drop"), unit="points"
 )
 """What `success_drop` gives, in points."""
 

@@ -7,14 +7,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from hda.flight.episode_row import MEASURES, RATIOS
-from studies.campaign.score import MEASURE_COLUMNS, RATIO_COLUMNS, Score, scaled
-from studies.columns import Column, Output, format_p, write_csv
+from studies.campaign.score import MEASURE_COLUMNS, RATIO_COLUMNS, Score
+from studies.columns import Column, Output, format_p, points_interval, write_csv
 from studies.compare.scores import StudyScores
 from studies.statistics.moments import mean_intervals
 from studies.statistics.paired import holm_adjust, pair_count_interval
 from studies.statistics.ratios import (
     Interval,
     mcnemar_count_p_value,
+    scaled,
 )
 
 
@@ -65,13 +66,11 @@ def compare_pairs(scores: StudyScores, policies: Sequence[str]) -> list[PairedDi
 
 
 def _points_column(name: str, heading: str) -> Column[PairedDifference]:
-    return Column(
+    return points_interval(
         f"{name}_points",
         heading,
         lambda difference: scaled(difference.ratios[name], 100.0),
-        unit="points",
-        interval=True,
-        form="{:+.1f}".format,
+        between="-",
     )
 
 

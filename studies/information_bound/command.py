@@ -22,6 +22,7 @@ from guidance.console import tolerate_encoding
 from guidance.validation import finite_number
 from hda.ground.library import Ground, tile_numbers
 from hda.task.presets import find_preset
+from hda.task.scenario import sample_scenario
 from studies.campaign.command_line import choose_policies, open_folder, resumable
 from studies.campaign.executor import local_processes
 from studies.campaign.journal import Journal, open_journal
@@ -50,7 +51,7 @@ class InformationBound(FolderOptions):
 
     Attributes:
         preset: the setting; point masses that know where they are must fly, to the target plane.
-        episodes: episodes that are bounded, and flown by each policy.
+        episodes: episodes that are bounded, and flown by each policy; for the picture over two tiles or more.
         looks: numbers of the looks at which hazard-aware is told the map, rising.
         study_seed: seed of the study; equal seeds give equal tables.
         split: tile split: validation or fresh.
@@ -96,6 +97,23 @@ def plan_study(options: InformationBound) -> Study:
     return Study(preset, names, options.episodes, options.study_seed, options.split, paths)
 
 
+def check_tiles(study: Study) -> None:
+    """Refuse episodes over one tile: the picture shows intervals clustered by tile, which then have no ends.
+
+    Raises:
+        ValueError: all episodes lie on one tile.
+    """
+    tiles: set[int] = set()
+    for episode in range(study.episodes):
+        tiles.add(sample_scenario(study.preset, study.study_seed, episode, study.split).tile.number)
+        if len(tiles) > 1:
+            return
+    raise ValueError(
+        f"episodes must lie on at least two tiles for the picture, got {study.episodes} on one:"
+        " ask for more, or give --no-figures"
+    )
+
+
 def bound_all(study: Study, journal: Journal[FloorRow], workers: int) -> list[FloorRow]:
     """The bounds of every episode; each is kept as it is finished."""
     lacking = [k for k in range(study.episodes) if journal.find((k,)) is None]
@@ -118,11 +136,14 @@ def run_information_bound(options: InformationBound) -> list[StepRow]:
     """Fly, bound, write the table and provenance.json, and print the table.
 
     Raises:
-        ValueError: an option is out of range or names something unknown, a folder holds another study, or a
-            policy or a worker failed.
+        ValueError: an option is out of range or names something unknown, all episodes lie on one tile where
+            figures are asked for, a folder holds another study, or a policy or a worker failed.
         OSError: the folder cannot be written.
     """
-    study, out = plan_study(options), open_folder(options.out)
+    study = plan_study(options)
+    if options.figures:
+        check_tiles(study)
+    out = open_folder(options.out)
     flown = fly_points(out, [Point("flights", study)], options.existing, options.workers)["flights"]
     decided = {name: getattr(options, name) for name in ("preset", "study_seed", "split")}
     identity = identify_run(Path(__file__).parent, decided)

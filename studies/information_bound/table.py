@@ -15,7 +15,7 @@ from guidance.arrays import Array
 from guidance.validation import unknown_name
 from hda.flight.episode_row import EpisodeRow
 from hda.registry import policy_entry
-from studies.columns import Column
+from studies.columns import Column, points_interval
 from studies.information_bound.restrictions import FAILURE, FloorRow
 from studies.statistics.moments import collect_moments, mean_intervals
 from studies.statistics.ratios import NO_INTERVAL, Interval
@@ -81,25 +81,12 @@ def _mark(row: StepRow) -> str:
     return " *" if not row.proved and policy_entry(row.step).privileged else ""
 
 
-def _points(key: str, heading: str, value: str) -> Column[StepRow]:
-    return Column(
-        key,
-        heading,
-        lambda row: getattr(row, value),
-        unit="points",
-        interval=True,
-        form="{:+.2f}".format,
-        between=" to ",
-        stem=value,
-    )
-
-
 COLUMNS: tuple[Column[StepRow], ...] = (
     Column("step", "step", lambda row: row.step, words=True, mark=_mark),
     Column("kind", "", lambda row: _BOUND if row.proved else _FLOWN, words=True, label="kind"),
     Column("loss_percent", "loss", lambda row: row.loss, 2, "%", interval=True, stem="loss"),
-    _points("rise_points", "above the step before", "rise"),
-    _points("below_points", "below the last step", "below"),
+    points_interval("rise_points", "above the step before", lambda row: row.rise, digits=2, stem="rise"),
+    points_interval("below_points", "below the last step", lambda row: row.below, digits=2, stem="below"),
     Column("failures", "failures", lambda row: row.failures, 0),
 )
 """A line a step; intervals are clustered by tile."""

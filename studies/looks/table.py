@@ -7,10 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from studies.campaign.score import scaled
-from studies.columns import Column
+from studies.columns import Column, percent_interval
 from studies.looks.counts import PixelCounts
-from studies.statistics.ratios import Interval, clustered_count_interval
+from studies.statistics.ratios import NO_INTERVAL, Interval, clustered_count_interval
 
 
 @dataclass(frozen=True)
@@ -42,7 +41,7 @@ def _clustered(hits: Sequence[int], trials: Sequence[int]) -> Interval:
     """Ratio over all tiles that had a trial."""
     some = np.asarray(trials) > 0
     if not some.any():
-        return Interval(float("nan"), float("nan"), float("nan"))
+        return NO_INTERVAL
     return clustered_count_interval(np.asarray(hits)[some], np.asarray(trials)[some])
 
 
@@ -71,23 +70,17 @@ COLUMNS: tuple[Column[LookRow], ...] = (
     Column("ray_spacing_m", "spacing", lambda row: row.spacing, digits=2, unit="m"),
     Column("safe_percent", "safe ground", lambda row: 100.0 * row.safe, digits=1, unit="%"),
     Column("known_percent", "known", lambda row: 100.0 * row.known, digits=1, unit="%"),
-    Column(
+    percent_interval(
         "precision_percent",
         "precision",
-        lambda row: scaled(row.precision, 100.0),
-        digits=1,
-        unit="%",
+        lambda row: row.precision,
         label="share of the ground called safe that is safe",
-        interval=True,
     ),
-    Column(
+    percent_interval(
         "recall_percent",
         "recall",
-        lambda row: scaled(row.recall, 100.0),
-        digits=1,
-        unit="%",
+        lambda row: row.recall,
         label="share of the safe ground that is called safe",
-        interval=True,
     ),
 )
 """Precision and recall: table.csv, table.md and the console read this list."""

@@ -7,8 +7,7 @@ from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from studies.campaign.score import scaled
-from studies.columns import Column, Output
+from studies.columns import Column, Output, percent_interval
 from studies.rare_events.batches import Batch
 from studies.rare_events.flights import RootRow
 from studies.statistics.ratios import Interval
@@ -92,15 +91,7 @@ _WRITTEN = Output.FILE | Output.DOCUMENT
 COLUMNS: tuple[Column[EstimateRow], ...] = (
     Column("way", "counted by", lambda row: row.way, words=True),
     Column("policy", "policy", lambda row: row.policy, words=True, outputs=_WRITTEN),
-    Column(
-        "failure_percent",
-        "failure",
-        lambda row: scaled(row.failure, 100.0),
-        digits=3,
-        unit="%",
-        interval=True,
-        stem="failure",
-    ),
+    percent_interval("failure_percent", "failure", lambda row: row.failure, digits=3, stem="failure"),
     Column("episodes", "episodes", lambda row: row.episodes),
     Column("tiles", "tiles", lambda row: row.tiles, outputs=_WRITTEN),
     Column("failing", "failing", lambda row: row.failing, label="episodes of which something failed"),

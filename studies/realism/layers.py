@@ -23,14 +23,13 @@ from studies.campaign.score import (
     RATIO_COLUMNS,
     Score,
     propellant_rise,
-    scaled,
     score_rows,
     success_drop,
 )
-from studies.columns import Column, Output
+from studies.columns import Column, Output, points_interval
 from studies.statistics.moments import tiled_mean
 from studies.statistics.paired import decide_leads, paired_ratio_interval
-from studies.statistics.ratios import NO_INTERVAL, Interval
+from studies.statistics.ratios import NO_INTERVAL, Interval, scaled
 
 
 @dataclass(frozen=True)
@@ -186,16 +185,7 @@ LAYER_COLUMNS: tuple[Column[LayerRow], ...] = (
     *(column.through(lambda row: row.score) for column in (*RATIO_COLUMNS, PROPELLANT_COLUMN)),
     replace(DROP_COLUMN.through(lambda row: row.step), key="step_points", heading="step", stem="step"),
     DROP_COLUMN.through(lambda row: row.fall),
-    Column(
-        "price_points",
-        "price",
-        lambda row: row.price,
-        unit="points",
-        interval=True,
-        form="{:+.2f}".format,
-        stem="price",
-        between=" to ",
-    ),
+    points_interval("price_points", "price", lambda row: row.price, digits=2, stem="price"),
     Column("lost", "lost", lambda row: row.lost),
     Column("causes", "causes", lambda row: row.causes, words=True, outputs=Output.FILE | Output.DOCUMENT),
 )
@@ -208,27 +198,16 @@ def pair_columns(presets: Sequence[str]) -> tuple[Column[PairRow], ...]:
         Column("better", "better", lambda row: row.better, words=True),
         Column("other", "other", lambda row: row.other, words=True),
         *(
-            Column(
+            points_interval(
                 f"{preset.replace('-', '_')}_points",
                 f"lead on {preset}",
                 lambda row, k=k: scaled(row.leads[k], 100.0),
-                unit="points",
-                interval=True,
-                form="{:+.1f}".format,
-                between=" to ",
                 stem=preset.replace("-", "_"),
             )
             for k, preset in enumerate(presets)
         ),
-        Column(
-            "extra_fall_points",
-            "falls more by",
-            lambda row: scaled(row.fall, 100.0),
-            unit="points",
-            interval=True,
-            form="{:+.1f}".format,
-            between=" to ",
-            stem="extra_fall",
+        points_interval(
+            "extra_fall_points", "falls more by", lambda row: scaled(row.fall, 100.0), stem="extra_fall"
         ),
         Column("verdict", "order", lambda row: row.verdict.value, words=True),
     )

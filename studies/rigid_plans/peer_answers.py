@@ -9,17 +9,16 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from time import process_time
 
 import numpy as np
 
-from guidance import solve_pdg_6dof
 from studies.campaign.journal import Journal
 from studies.peers.openscvx_process import OPENSCVX_METHOD, WorkerProcess
 from studies.rigid_plans.commanded_flight import CommandedFlight, fly_commanded, limit_excess
 from studies.rigid_plans.openscvx_body import OpenscvxSettings, Weights, ask_openscvx
 from studies.rigid_plans.peer_problems import PeerProblem, published_example, shared_example, start_problem
 from studies.rigid_plans.peer_table import LEAST_EXCESS, NO_FLIGHT, OWN_METHOD, FlownPlan, PeerAnswer
+from studies.rigid_plans.starts import plan_problem
 
 EXAMPLE_MESHES = (21, 31, 41)
 """Nodes of our plans for the example."""
@@ -52,21 +51,8 @@ Ask = Callable[[PeerProblem], _Plan]
 
 
 def _ask_own(peer: PeerProblem, nodes: int) -> _Plan:
-    problem = peer.problem
-    begun = process_time()
-    plan = solve_pdg_6dof(
-        problem.state,
-        problem.target,
-        problem.body,
-        gravity=problem.gravity,
-        target_velocity=problem.target_velocity,
-        glide_slope_limit=problem.glide_slope,
-        free_attitude=problem.free_attitude,
-        nodes=nodes,
-        throw=False,
-    )
-    seconds = process_time() - begun
-    flight = CommandedFlight.of_flight(plan.flight, problem.body.engine_lag) if plan.nodes else None
+    plan, seconds = plan_problem(peer.problem, nodes)
+    flight = CommandedFlight.of_flight(plan.flight, peer.problem.body.engine_lag) if plan.nodes else None
     return _Plan(plan.status.value, seconds, plan.solves, flight)
 
 

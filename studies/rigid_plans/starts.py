@@ -122,20 +122,35 @@ def draw_start(preset: str, start: int) -> RigidLandingProblem:
     )
 
 
-def plan_start(start: int, method: RigidPlanningMethod, preset: str, nodes: int) -> PlannedStart:
-    """Plan a start, and fly the plan."""
-    asked = draw_start(preset, start)
+def plan_problem(
+    problem: RigidLandingProblem, nodes: int, method: RigidPlanningMethod = "successive"
+) -> tuple[RigidPlan, float]:
+    """Ask `solve_pdg_6dof`; a plan without a flight is returned, not raised.
+
+    Returns:
+        The plan, and the processor time [s] that it took.
+    """
     begun = process_time()
     plan = solve_pdg_6dof(
-        asked.state,
-        asked.target,
-        asked.body,
-        gravity=asked.gravity,
+        problem.state,
+        problem.target,
+        problem.body,
+        gravity=problem.gravity,
+        target_velocity=problem.target_velocity,
+        glide_slope_limit=problem.glide_slope,
+        free_attitude=problem.free_attitude,
+        objective=problem.objective,
         nodes=nodes,
         method=method,
         throw=False,
     )
-    return _row(start, method, process_time() - begun, plan)
+    return plan, process_time() - begun
+
+
+def plan_start(start: int, method: RigidPlanningMethod, preset: str, nodes: int) -> PlannedStart:
+    """Plan a start, and fly the plan."""
+    plan, seconds = plan_problem(draw_start(preset, start), nodes, method)
+    return _row(start, method, seconds, plan)
 
 
 def _row(start: int, method: str, seconds: float, plan: RigidPlan) -> PlannedStart:

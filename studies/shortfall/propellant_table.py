@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -70,35 +70,18 @@ def _numbers(parts: PropellantParts) -> list[float]:
     return [*spent, len(lengths), sum(lengths), parts.offset, parts.time]
 
 
+def _percent_column(name: str, heading: str, value: Callable[[PartRow], Interval]) -> Column[PartRow]:
+    return Column(f"{name}_percent", heading, value, digits=2, unit="%", interval=True)
+
+
 PART_COLUMNS: tuple[Column[PartRow], ...] = (
     Column("policy", "policy", lambda row: row.policy, words=True),
-    Column("propellant_percent", "propellant", lambda row: row.whole, digits=2, unit="%", interval=True),
-    Column(
-        "direct_percent",
-        "last site known from the start",
-        lambda row: row.direct,
-        digits=2,
-        unit="%",
-        interval=True,
-    ),
-    Column(
-        "early_percent",
-        f"other sites above {EARLY:g} m",
-        lambda row: row.early,
-        digits=2,
-        unit="%",
-        interval=True,
-    ),
-    Column(
-        "first_percent",
-        "of these the first look's",
-        lambda row: row.first,
-        digits=2,
-        unit="%",
-        interval=True,
-    ),
-    Column("late_percent", "below", lambda row: row.late, digits=2, unit="%", interval=True),
-    Column("guidance_percent", "guidance", lambda row: row.guidance, digits=2, unit="%", interval=True),
+    _percent_column("propellant", "propellant", lambda row: row.whole),
+    _percent_column("direct", "last site known from the start", lambda row: row.direct),
+    _percent_column("early", f"other sites above {EARLY:g} m", lambda row: row.early),
+    _percent_column("first", "of these the first look's", lambda row: row.first),
+    _percent_column("late", "below", lambda row: row.late),
+    _percent_column("guidance", "guidance", lambda row: row.guidance),
     Column("moves", "moves", lambda row: row.moves, digits=1),
     Column("moved_m", "moved", lambda row: row.moved, digits=1, unit="m"),
     Column("offset_m", "last from first target", lambda row: row.offset, digits=1, unit="m"),

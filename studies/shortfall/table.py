@@ -10,8 +10,7 @@ from statistics import median
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.campaign.score import scaled
-from studies.columns import Column
+from studies.columns import Column, percent_interval
 from studies.failures.causes import SAFE_READING
 from studies.shortfall.encoded_sight import (
     AREAS,
@@ -249,14 +248,7 @@ ISLAND_COLUMNS: tuple[Column[IslandRow], ...] = (
     Column("height_m", "height m", lambda row: _band(HEIGHTS, row.height), words=True),
     Column("area_m2", "island m²", lambda row: _band(AREAS, row.area), words=True),
     Column("islands", "islands read", lambda row: row.islands),
-    Column(
-        "shown_percent",
-        "encoding shows",
-        lambda row: scaled(row.shown, 100.0),
-        digits=1,
-        unit="%",
-        interval=True,
-    ),
+    percent_interval("shown_percent", "encoding shows", lambda row: row.shown),
 )
 """islands.csv, islands.md and the console read this list."""
 
@@ -270,21 +262,7 @@ HAZARD_COLUMNS: tuple[Column[HazardRow], ...] = (
         words=True,
     ),
     Column("pixels", "pixels", lambda row: row.pixels),
-    Column(
-        "read_percent",
-        "look reads a hazard",
-        lambda row: scaled(row.read, 100.0),
-        digits=1,
-        unit="%",
-        interval=True,
-    ),
-    Column(
-        "encoded_percent",
-        "encoding shows one",
-        lambda row: scaled(row.encoded, 100.0),
-        digits=1,
-        unit="%",
-        interval=True,
-    ),
+    percent_interval("read_percent", "look reads a hazard", lambda row: row.read),
+    percent_interval("encoded_percent", "encoding shows one", lambda row: row.encoded),
 )
 """hazards.csv, hazards.md and the console read this list."""

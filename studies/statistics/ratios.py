@@ -35,6 +35,11 @@ NO_INTERVAL = Interval(math.nan, math.nan, math.nan)
 """Where there is nothing to estimate: an empty cell in tables."""
 
 
+def scaled(interval: Interval, factor: float) -> Interval:
+    """The interval in another unit, such as percent."""
+    return Interval(factor * interval.estimate, factor * interval.low, factor * interval.high)
+
+
 def wilson_interval(successes: int, episodes: int, confidence: float = 0.95) -> Interval:
     """Interval of a success ratio over independent episodes (Wilson 1927).
 

@@ -14,13 +14,12 @@ from studies.campaign.score import (
     RATIO_COLUMNS,
     Score,
     propellant_rise,
-    scaled,
     score_rows,
     success_drop,
 )
-from studies.columns import Column, format_p
+from studies.columns import Column, format_p, points_interval
 from studies.statistics.paired import CHANCE, decide_leads
-from studies.statistics.ratios import NO_INTERVAL, Interval
+from studies.statistics.ratios import NO_INTERVAL, Interval, scaled
 
 
 class Standing(StrEnum):
@@ -156,19 +155,6 @@ def _tell(row: StandingRow) -> str:
     return f"{failures} of {row.score.episodes}, {row.score.propellant.estimate:.2f} % of the propellant"
 
 
-def _points(key: str, heading: str, factor: float, value: str, digits: int) -> Column[StandingRow]:
-    return Column(
-        f"{key}_points",
-        heading,
-        lambda row: scaled(getattr(row, value), factor),
-        unit="points",
-        interval=True,
-        form=f"{{:+.{digits}f}}".format,
-        stem=key,
-        between=" to ",
-    )
-
-
 _SAFE_SITE, _SUCCESS = RATIO_COLUMNS
 
 COLUMNS: tuple[Column[StandingRow], ...] = (
@@ -183,9 +169,13 @@ COLUMNS: tuple[Column[StandingRow], ...] = (
     replace(_SAFE_SITE, brief=True).through(lambda row: row.score),
     replace(_SUCCESS, by_tile=None).through(lambda row: row.score),
     PROPELLANT_COLUMN.through(lambda row: row.score),
-    _points("fails_more", "fails more by", 100.0, "fails_more", 1),
+    points_interval(
+        "fails_more_points", "fails more by", lambda row: scaled(row.fails_more, 100.0), stem="fails_more"
+    ),
     Column("holm_p", "p (Holm)", lambda row: row.holm_p, form=format_p),
-    _points("burns_more", "burns more by", 1.0, "burns_more", 2),
+    points_interval(
+        "burns_more_points", "burns more by", lambda row: row.burns_more, digits=2, stem="burns_more"
+    ),
     Column("standing", "stands", lambda row: row.standing.value, words=True),
 )
 """A line for each preset and policy, against the reference."""

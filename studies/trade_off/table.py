@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 from rich.console import Console
 
-from studies.campaign.score import PROPELLANT_COLUMN, RATIO_COLUMNS, Score, scaled
+from studies.campaign.score import PROPELLANT_COLUMN, RATIO_COLUMNS, Score
 from studies.columns import Column, Output, console_table
-from studies.statistics.ratios import NO_INTERVAL, Interval
+from studies.statistics.ratios import NO_INTERVAL, Interval, scaled
 
 
 @dataclass(frozen=True)

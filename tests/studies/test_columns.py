@@ -10,7 +10,16 @@ from hypothesis import strategies as st
 
 from hda.flight.episode_row import MEASURES
 from studies.campaign.score import MEASURE_COLUMNS, Score
-from studies.columns import Column, Output, console_table, markdown_lines, standing_in, write_csv
+from studies.columns import (
+    Column,
+    Output,
+    console_table,
+    markdown_lines,
+    percent_interval,
+    points_interval,
+    standing_in,
+    write_csv,
+)
 from studies.compare.differences import DIFFERENCE_COLUMNS
 from studies.compare.table import COLUMNS
 from studies.statistics.ratios import Interval
@@ -66,6 +75,17 @@ def test_every_output_shows_the_value_of_the_file(tmp_path_factory, ratio: float
     table = console_table(TWO, [line], "title [as it is]")
     cells = [next(iter(column.cells)) for column in table.columns]
     assert cells == ["one *", f"{ratio:.2f}\n{ends[0]}-{ends[1]}\n\\[{ends[2]}-{ends[3]}]"]
+
+
+def test_ratios_are_shown_in_percent_and_differences_with_their_signs() -> None:
+    line = Interval(0.25, -0.125, 0.5)
+    ratio: Column[Interval] = percent_interval("success_percent", "success", lambda value: value, stem="won")
+    assert ratio.names() == ["success_percent", "won_low", "won_high"]
+    assert ratio.cells(line) == ["25", "-12.5", "50"]
+    assert (ratio.title, ratio.text(line), ratio.ranges(line)) == ("success %", "25.0", ["-12.5-50.0"])
+    lead: Column[Interval] = points_interval("lead_points", "lead", lambda value: value, digits=2)
+    assert lead.cells(line) == ["0.25", "-0.125", "0.5"]
+    assert (lead.title, lead.text(line), lead.ranges(line)) == ("lead points", "+0.25", ["-0.12 to +0.50"])
 
 
 def test_a_nan_is_an_empty_cell_everywhere(tmp_path: Path) -> None:

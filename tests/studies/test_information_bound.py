@@ -348,6 +348,17 @@ def test_the_command_writes_the_steps_and_goes_on(tmp_path: Path) -> None:
     assert (options.out / "table.csv").read_bytes() == table
 
 
+def test_one_tile_is_refused_before_anything_is_flown_and_goes_without_a_picture(tmp_path: Path) -> None:
+    one = replace(SMALL, episodes=1, looks=(99,), out=tmp_path / "bounded")
+    message = r"episodes must lie on at least two tiles for the picture, got 1 on one: .*--no-figures"
+    with pytest.raises(ValueError, match=message):
+        run(one)
+    assert not one.out.exists()
+    lines = run(replace(one, figures=False))
+    assert all(math.isinf(line.loss.high) for line in lines)
+    assert (one.out / "table.csv").exists()
+
+
 _NO = Interval(math.nan, math.nan, math.nan)
 STEPS = [
     StepRow("every policy", True, Interval(48.0, 47.9, 48.1), _NO, Interval(6.0, 5.9, 6.1), math.nan),

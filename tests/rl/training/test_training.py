@@ -13,7 +13,7 @@ from rl.inference.artefacts import ArtefactError, load_artefact, save_artefact
 from rl.learning.algorithms import make_algorithm
 from rl.learning.recurrent.hyperparameters import Hyperparameters
 from rl.recipes import RECIPES
-from rl.training.checkpoint import newest_checkpoint, restore_checkpoint
+from rl.training.checkpoint import KIND, newest_checkpoint, restore_checkpoint
 from rl.training.export import ExportWeights, run_export
 from rl.training.run import make_environment, run_training
 from rl.training.run_folder import TrainingPlan, read_rows
@@ -179,6 +179,21 @@ def test_a_damaged_checkpoint_is_refused(tmp_path):
     checkpoint.write_bytes(bytes(content))
     with pytest.raises(ArtefactError, match="does not match its card"):
         run_training(folder, PAPER, SMALL["td3"], plan(80), resume=True)
+
+
+def test_a_damaged_card_is_named_and_the_checkpoint_before_it_is_taken(tmp_path, capsys):
+    for step in (30, 60):
+        save_artefact(tmp_path / f"checkpoint-{step:09d}", KIND, {"a": np.zeros(1)}, {})
+    newest = tmp_path / "checkpoint-000000060.json"
+    assert newest_checkpoint(tmp_path) == newest.with_suffix("")
+    assert capsys.readouterr().err == ""
+    newest.write_text(newest.read_text()[:-9])
+    assert newest_checkpoint(tmp_path) == tmp_path / "checkpoint-000000030"
+    words = capsys.readouterr().err
+    assert words.startswith(f"passed over: {newest} is damaged or not a JSON card")
+    (tmp_path / "checkpoint-000000030.json").write_text("{}")
+    assert newest_checkpoint(tmp_path) is None
+    assert capsys.readouterr().err.count("passed over: ") == 2
 
 
 def test_fast_update_equals_that_of_sb3(tmp_path):
