@@ -79,11 +79,15 @@ def save_checkpoint(folder: Path, algorithm: Algorithm, env: Environment, card: 
 
 
 def newest_checkpoint(folder: Path) -> Path | None:
-    """Path (without suffix) of the newest checkpoint whose card is complete, or None.
+    """Path (without suffix) of the newest checkpoint whose card is complete; None where there is no card.
 
     Cards that are not are named on stderr.
+
+    Raises:
+        ArtefactError: there are cards, and none is complete.
     """
-    for card in sorted(folder.glob("checkpoint-*.json"), reverse=True):
+    cards = sorted(folder.glob("checkpoint-*.json"), reverse=True)
+    for card in cards:
         try:
             read_card(card, KIND)
         except ArtefactError as error:
@@ -91,6 +95,11 @@ def newest_checkpoint(folder: Path) -> Path | None:
             Console(stderr=True).print(told, style="yellow", markup=False, highlight=False, soft_wrap=True)
         else:
             return card.with_suffix("")
+    if cards:
+        raise ArtefactError(
+            f"no checkpoint in {folder} is whole: train in another --out,"
+            " or remove checkpoint-* to begin anew"
+        )
     return None
 
 

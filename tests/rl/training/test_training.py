@@ -192,8 +192,20 @@ def test_a_damaged_card_is_named_and_the_checkpoint_before_it_is_taken(tmp_path,
     words = capsys.readouterr().err
     assert words.startswith(f"passed over: {newest} is damaged or not a JSON card")
     (tmp_path / "checkpoint-000000030.json").write_text("{}")
-    assert newest_checkpoint(tmp_path) is None
+    with pytest.raises(ArtefactError, match=r"no checkpoint in .* is whole"):
+        newest_checkpoint(tmp_path)
     assert capsys.readouterr().err.count("passed over: ") == 2
+
+
+def test_a_run_without_a_whole_checkpoint_keeps_its_log(tmp_path):
+    folder = tmp_path / "run"
+    run_training(folder, PAPER, SMALL["td3"], plan(60), resume=False)
+    log = (folder / "validation.csv").read_text()
+    for card in folder.glob("checkpoint-*.json"):
+        card.write_text("{}")
+    with pytest.raises(ArtefactError, match="whole: train in another --out"):
+        run_training(folder, PAPER, SMALL["td3"], plan(80), resume=True)
+    assert (folder / "validation.csv").read_text() == log
 
 
 def test_fast_update_equals_that_of_sb3(tmp_path):
