@@ -16,8 +16,7 @@ if TYPE_CHECKING:
     from hda.flight.touchdown_report import TouchdownFault, TouchdownReport
     from hda.ground.library import SPLITS, Ground, load_tile, prepare_tiles
     from hda.ground.tile import Tile, make_tile
-    from hda.navigation.filter import navigate
-    from hda.navigation.flown_path import FlownPath
+    from hda.navigation.filter import FlownPath, navigate
     from hda.navigation.navigation_state import NavigationState, begin_navigation
     from hda.navigation.sensors import Altimeter, InertialUnit, SiteFixes, TerrainFixes, Velocimeter
     from hda.navigation.system import NavigationSystem
@@ -44,8 +43,7 @@ _HOMES = {
     "hda.flight.touchdown_report": ("TouchdownFault", "TouchdownReport"),
     "hda.ground.library": ("SPLITS", "Ground", "load_tile", "prepare_tiles"),
     "hda.ground.tile": ("Tile", "make_tile"),
-    "hda.navigation.filter": ("navigate",),
-    "hda.navigation.flown_path": ("FlownPath",),
+    "hda.navigation.filter": ("FlownPath", "navigate"),
     "hda.navigation.navigation_state": ("NavigationState", "begin_navigation"),
     "hda.navigation.sensors": ("Altimeter", "InertialUnit", "SiteFixes", "TerrainFixes", "Velocimeter"),
     "hda.navigation.system": ("NavigationSystem",),

@@ -96,13 +96,12 @@ def begin_flight(scenario: Scenario) -> Flight:
 
 def observe(scenario: Scenario, flight: Flight) -> Observation:
     """Take the look of this instant; its noise depends on the episode and the number of the look only."""
-    lidar = scenario.preset.lidar
+    lidar, rules = scenario.preset.lidar, scenario.preset.rules
     position = flight.state.position
     navigation, body = flight.navigation, flight.body
     error = estimation.estimation_error(scenario, navigation, flight.state, flight.target)
     aim = estimation.look_aim(scenario, flight.target, error)
     estimate, width = estimation.displaced(flight.state, error), lidar.width(position, aim)
-    rules = scenario.preset.rules
     late = flight.index > 0 and flight.time_to_go <= _LATE * rules.decision_interval
     stance, ground = None if late else scenario.preset.stance, None
     if isinstance(lidar, RangingLidar):
@@ -114,7 +113,7 @@ def observe(scenario: Scenario, flight: Flight) -> Observation:
         noise = scenario.streams.look(flight.index, lidar.pixels)
         axis = None if body is None else sensor_axis(body.attitude)
         safety_map = look(lidar, position, aim, scenario.tile.probability, noise, axis)
-    turning = _believe_turning(scenario, flight)
+    attitude, rates, attitude_covariance = _believe_turning(scenario, flight)
     return Observation(
         index=flight.index,
         time=flight.index * rules.decision_interval,
@@ -126,9 +125,9 @@ def observe(scenario: Scenario, flight: Flight) -> Observation:
         ground=ground,
         stance=stance,
         covariance=None if navigation is None else navigation.relative_covariance,
-        attitude=turning.attitude,
-        rates=turning.rates,
-        attitude_covariance=turning.covariance,
+        attitude=attitude,
+        rates=rates,
+        attitude_covariance=attitude_covariance,
     )
 
 

@@ -1,7 +1,7 @@
 """Where the lander believes it is: its navigation sensors, and the filter that makes an estimate of them.
 
 `sensors` and `system` say what is aboard, `sensor_errors` what chance does to it. `navigation_state` is what
-the filter knows, `filter` takes it along a `flown_path`, `site_tracking` puts the landing site into it. The
+the filter knows, `filter` takes it along a flown path, `site_tracking` puts the landing site into it. The
 other modules are their kernels: `layout` names the numbers, `propagation` is the inertial unit, `attitude`
 that of a turning body, `readings` and `site_fixes` are the other sensors, `schmidt_update` takes a
 measurement in, `control_period` takes the filter over one period or along a path, `steering` calls it in the
@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING
 from guidance.exports import lazy_exports
 
 if TYPE_CHECKING:
-    from hda.navigation.filter import NavigationLog, measure_ranges, navigate
-    from hda.navigation.flown_path import FlownPath
+    from hda.navigation.filter import FlownPath, NavigationLog, measure_ranges, navigate
     from hda.navigation.navigation_state import NavigationState, begin_navigation
     from hda.navigation.sensor_errors import (
         FixDraws,
@@ -36,8 +35,7 @@ if TYPE_CHECKING:
     from hda.navigation.system import NAVIGATION_FAULTS, NavigationSystem, add_fault
 
 _HOMES = {
-    "hda.navigation.filter": ("NavigationLog", "measure_ranges", "navigate"),
-    "hda.navigation.flown_path": ("FlownPath",),
+    "hda.navigation.filter": ("FlownPath", "NavigationLog", "measure_ranges", "navigate"),
     "hda.navigation.navigation_state": ("NavigationState", "begin_navigation"),
     "hda.navigation.sensor_errors": (
         "FixDraws",
