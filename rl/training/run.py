@@ -150,11 +150,11 @@ def _open_folder(
             raise ValueError(
                 f"{folder} was begun with another {' and '.join(changed)}; resume it with the same"
             )
+    checkpoint = newest_checkpoint(folder) if resume else None
     folder.mkdir(parents=True, exist_ok=True)
     contents = {**asked, "plan": asdict(plan), "device": device}
     contents |= {"versions": library_versions(), "card": actor_card(settings)}
     card.write_text(json.dumps(contents, indent=1, sort_keys=True) + "\n")
-    checkpoint = newest_checkpoint(folder) if resume else None
     if checkpoint is None:
         for name in ("training.csv", "validation.csv"):
             (folder / name).unlink(missing_ok=True)

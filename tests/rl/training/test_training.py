@@ -200,12 +200,13 @@ def test_a_damaged_card_is_named_and_the_checkpoint_before_it_is_taken(tmp_path,
 def test_a_run_without_a_whole_checkpoint_keeps_its_log(tmp_path):
     folder = tmp_path / "run"
     run_training(folder, PAPER, SMALL["td3"], plan(60), resume=False)
-    log = (folder / "validation.csv").read_text()
+    record, log = ((folder / name).read_bytes() for name in ("run.json", "validation.csv"))
     for card in folder.glob("checkpoint-*.json"):
         card.write_text("{}")
     with pytest.raises(ArtefactError, match="whole: train in another --out"):
         run_training(folder, PAPER, SMALL["td3"], plan(80), resume=True)
-    assert (folder / "validation.csv").read_text() == log
+    assert (folder / "validation.csv").read_bytes() == log
+    assert (folder / "run.json").read_bytes() == record
 
 
 def test_fast_update_equals_that_of_sb3(tmp_path):
